@@ -5,8 +5,8 @@
 // Meshes with holes: repair::close_holes adds cones to the geometry, repair::exterior decides each body's voxels on a
 // dense grid of bits, as repair::vote does (solid_vote.hpp). All three give sets that no order of work can change.
 
-#include <cpu_ref/bit_grid.hpp>
 #include <cpu_ref/solid_cover.hpp>
+#include <voxelpipe/core/bit_grid.hpp>
 #include <voxelpipe/core/holes.hpp>
 
 #include <algorithm>
@@ -16,6 +16,8 @@
 #include <vector>
 
 namespace voxelpipe::cpu {
+
+using core::bit_grid;
 
 // ---- close_holes ----------------------------------------------------------------------------------------------------
 
@@ -113,101 +115,6 @@ inline void end_beams(const execution& how, std::vector<beam_words>& beams) {
 
 // ---- exterior -------------------------------------------------------------------------------------------------------
 
-// The bits of `open` that rows of `from` reach along x: `from` is a part of `open`.
-inline void spread_in_row(std::uint64_t* from, const std::uint64_t* open, std::size_t n) {
-    // Upwards: adding the seeds to the open bits carries through each run from its lowest seed; what changes is
-    // covered.
-    unsigned carry = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-        const std::uint64_t seeds = from[i] | (carry & open[i]);
-        const std::uint64_t sum = open[i] + seeds;
-        from[i] = seeds | (open[i] & ~sum);
-        carry = sum < open[i] ? 1u : 0u;
-    }
-    // Downwards: bits below a seed within its run.
-    std::uint64_t above = 0;
-    for (std::size_t i = n; i-- > 0;) {
-        std::uint64_t f = from[i] | ((above << 63) & open[i]), run = open[i];
-        for (int k = 1; k < 64; k *= 2) {
-            f |= (f >> k) & run;
-            run &= run >> k;
-        }
-        from[i] = f;
-        above = f & 1;
-    }
-}
-
-// Adds the bits of ~walls that a 6-connected walk through them reaches from those that are reached, none of which is a
-// wall.
-inline void spread(const bit_grid& walls, bit_grid& reached) {
-    const glm::ivec3 e = walls.extent();
-    const std::size_t n = walls.words();
-    struct place {
-        int y, z;
-    };
-    std::vector<place> queue;
-    std::vector<bool> queued(static_cast<std::size_t>(e.y) * static_cast<std::size_t>(e.z), true);
-    const auto index = [&](int y, int z) {
-        return static_cast<std::size_t>(z) * static_cast<std::size_t>(e.y) + static_cast<std::size_t>(y);
-    };
-    std::vector<std::uint64_t> open(n);
-    for (int z = 0; z < e.z; ++z)
-        for (int y = 0; y < e.y; ++y) queue.push_back({y, z});
-    while (!queue.empty()) {
-        const auto [y, z] = queue.back();
-        queue.pop_back();
-        queued[index(y, z)] = false;
-        std::uint64_t* const r = reached.row(y, z);
-        const std::uint64_t* const w = walls.row(y, z);
-        for (std::size_t i = 0; i < n; ++i) open[i] = ~w[i];
-        open[n - 1] &= walls.last_word();
-        spread_in_row(r, open.data(), n);
-        const auto pass_on = [&](int to_y, int to_z) {
-            if (to_y < 0 || to_z < 0 || to_y >= e.y || to_z >= e.z) return;
-            std::uint64_t* const to = reached.row(to_y, to_z);
-            const std::uint64_t* const wall = walls.row(to_y, to_z);
-            std::uint64_t changed = 0;
-            for (std::size_t i = 0; i < n; ++i) {
-                const std::uint64_t fresh = r[i] & ~wall[i] & ~to[i];
-                to[i] |= fresh;
-                changed |= fresh;
-            }
-            if (changed == 0 || queued[index(to_y, to_z)]) return;
-            queued[index(to_y, to_z)] = true;
-            queue.push_back({to_y, to_z});
-        };
-        pass_on(y - 1, z);
-        pass_on(y + 1, z);
-        pass_on(y, z - 1);
-        pass_on(y, z + 1);
-    }
-}
-
-// Sets the bits of the grid's faces: of all but the lowest and the highest along z, or of these too.
-inline void set_faces(bit_grid& g, bool lowest, bool highest) {
-    const glm::ivec3 e = g.extent();
-    const std::size_t n = g.words();
-    for (int z = 0; z < e.z; ++z)
-        for (int y = 0; y < e.y; ++y) {
-            std::uint64_t* const r = g.row(y, z);
-            if (y == 0 || y == e.y - 1 || (lowest && z == 0) || (highest && z == e.z - 1)) {
-                std::fill(r, r + n, ~std::uint64_t{0});
-                r[n - 1] &= g.last_word();
-            } else {
-                g.set(0, y, z);
-                g.set(e.x - 1, y, z);
-            }
-        }
-}
-
-// The bits of ~walls that a 6-connected walk through them reaches from the faces of the grid, which hold no walls.
-[[nodiscard]] inline bit_grid flood(const bit_grid& walls) {
-    bit_grid reached(walls.extent());
-    set_faces(reached, true, true);
-    spread(walls, reached);
-    return reached;
-}
-
 // What solid_options::slab gives, in the numbers of the geometry's grid, in which the slab begins at its lead.
 class slab_bits {
 public:
@@ -249,9 +156,9 @@ private:
         for_each_word(cover, rows, draw, [&](int x, int y, int z, std::uint32_t bits) {
             grid.set_bits(x + ring, y + ring, z + ring, bits);
         });
-        dilate(grid, closing, how.threads);
-        grid = flood(grid);
-        dilate(grid, closing, how.threads);
+        core::dilate(grid, closing, how.threads);
+        grid = core::flood(grid);
+        core::dilate(grid, closing, how.threads);
         if (draw == 0) beams = all_beams(rows); // behind the grid, which is what there may be no memory for
         add_bits(how, rows, s.whole_box(), draw, beams,
                  [&](int x, int y, int z) { return ~grid.get_bits(x + ring, y + ring, z + ring); });

@@ -47,7 +47,7 @@ enum class repair : std::uint8_t {
 // of host memory: 64 voxels along x a word, from the slab's first one on, each row of words from a new word on; rows by
 // ascending y, then z. Not owned.
 struct solid_slab {
-    // exterior: the slab's voxels that are inside, which is all that is drawn (cpu_ref/slab_exterior.hpp). Like
+    // exterior: the slab's voxels that are inside, which is all that is drawn (slabs/exterior.hpp). Like
     // solid_options::cones, they need a triangle to be drawn, whichever.
     const std::uint64_t* inside = nullptr;
     // vote, a bit a column along z: the parity below the slab, and whether the column is open (slabs/columns.hpp). The
@@ -71,8 +71,8 @@ struct solid_options {
     // exterior: gaps of up to about twice as many voxels are closed, 0 to max_closing.
     int closing = 0;
     static constexpr int max_closing = 64; // the largest `closing`
-    // exterior or vote of a slab of a mesh in slabs, with bodies::call; on cpu_backend alone. Null: of the grid by
-    // itself.
+    // exterior or vote of a slab of a mesh in slabs, with bodies::call (slabs/stream.hpp puts it together). Null: of
+    // the grid by itself.
     const solid_slab* slab = nullptr;
 };
 

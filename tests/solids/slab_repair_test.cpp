@@ -5,8 +5,8 @@
 // against crops of one call.
 #include "solid_support.hpp"
 
-#include <cpu_ref/slab_exterior.hpp>
 #include <voxelpipe/slabs/columns.hpp>
+#include <voxelpipe/slabs/exterior.hpp>
 
 #include <algorithm>
 #include <cstddef>
@@ -20,7 +20,6 @@
 namespace solids {
 namespace {
 
-namespace cpu = vp::cpu;
 namespace slabs = vp::slabs;
 
 std::string temporary() { return std::filesystem::temp_directory_path().string(); }
@@ -114,7 +113,7 @@ struct flood_result {
 
 // Walls come in two parts whose border cuts bricks; the inside is asked for in boxes of `step` layers.
 flood_result expect_flood(const voxel_set& walls, glm::ivec3 extent, int closing, int layers, int step) {
-    cpu::slab_exterior flood(extent, closing, budget_for(extent, closing, layers), temporary(), 2);
+    slabs::slab_exterior flood(extent, closing, budget_for(extent, closing, layers), temporary(), 2);
     const int cut = extent.z / 2;
     const bricks high(walls, extent, cut, extent.z), low(walls, extent, 0, cut);
     flood.add_walls(high.table(extent));
@@ -125,7 +124,7 @@ flood_result expect_flood(const voxel_set& walls, glm::ivec3 extent, int closing
     std::size_t wrong = 0;
     for (int z = 0; z < extent.z; z += step) {
         const glm::ivec3 size(extent.x - corner.x, extent.y - corner.y - 1, std::min(step, extent.z - z));
-        const cpu::bit_grid found = flood.inside({corner.x, corner.y, z}, size);
+        const vp::core::bit_grid found = flood.inside({corner.x, corner.y, z}, size);
         for (int k = 0; k < size.z; ++k)
             for (int j = 0; j < size.y; ++j)
                 for (int i = 0; i < size.x; ++i)
@@ -257,14 +256,14 @@ TEST(SlabExterior, SlabsAreThoseOfOneCall) {
         const int closing = round % 3;
         vp::solid_options options{.repair = vp::repair::exterior, .closing = closing};
         const solid whole = library_solid(m, g, options);
-        cpu::slab_exterior flood(extent, closing, 1, temporary(), 1);
+        slabs::slab_exterior flood(extent, closing, 1, temporary(), 1);
         const bricks walls(library_cover(m, g), extent, 0, extent.z);
         flood.add_walls(walls.table(extent));
         flood.flood();
         for (const auto& ranges : cuts)
             for (const slabs::layer_range& r : ranges) {
                 const glm::ivec3 begin(0, 0, r.begin), size(extent.x, extent.y, r.size());
-                const cpu::bit_grid inside = flood.inside(begin, size);
+                const vp::core::bit_grid inside = flood.inside(begin, size);
                 vp::solid_slab bits;
                 bits.inside = inside.data();
                 options.slab = &bits;

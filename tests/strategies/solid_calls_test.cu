@@ -4,6 +4,8 @@
 // Solids in calls that run again, fail or do not wait, of instances, and with repairs.
 #include "solid_drawings.hpp"
 
+#include <voxelpipe/slabs/columns.hpp>
+
 using namespace device_test;
 
 // ---- calls ----------------------------------------------------------------------------------------------------------
@@ -240,6 +242,90 @@ TEST(Solids, ExteriorAndVote) {
     }
     const drawing_of_bits one{{broken_meshes()[1]}, {{}}, {{true}}};
     one.expect_same(box_grid({130, 41, 43}), {.repair = vp::repair::exterior, .closing = 35});
+}
+
+// A slab takes what the rest of the grid has decided (solid_options::slab): as on the CPU, and as the whole's layers.
+struct layers {
+    int begin, end;
+};
+inline constexpr layers slab_layers[] = {{0, 5}, {5, 6}, {6, 14}, {14, 20}};
+template <class Expected>
+void expect_slab(const drawing_of_bits& drawn, const vp::grid& g, const layers& at, const vp::solid_options& options,
+                 const Expected& expected) {
+    vp::cuda_backend gpu;
+    const vp::grid slab = g.crop({0, 0, at.begin}, {g.extent.x, g.extent.y, at.end - at.begin});
+    bit_target<vp::cuda_backend> bits{gpu, slab.extent};
+    const vp::status s = drawn.draw(gpu, bits, slab, options, loading::clear);
+    ASSERT_TRUE(s.ok()) << s.message();
+    const auto found = vp::get<0>(bits).to_host_target(gpu);
+    int wrong = 0;
+    for (int z = 0; z < slab.extent.z; ++z)
+        for (int y = 0; y < slab.extent.y; ++y)
+            for (int x = 0; x < slab.extent.x; ++x) wrong += found(x, y, z) != expected(x, y, at.begin + z);
+    EXPECT_EQ(wrong, 0) << "layers from " << at.begin;
+}
+
+TEST(Solids, SlabsOfAVote) {
+    const auto meshes = broken_meshes();
+    const drawing_of_everything all{meshes, {{0.0f}}, {{1, 0.1f}}};
+    const drawing_of_bits bits{meshes, {{}}, {{true}}};
+    for (const vp::grid& g : {box_grid({70, 26, 20}), box_grid({70, 26, 25}).crop({9, 5, 2}, {41, 17, 20})}) {
+        const vp::core::snap_transform snap = vp::core::make_snap_transform(g);
+        std::vector<vp::slabs::layer_range> ranges;
+        for (const layers& l : slab_layers) ranges.push_back({l.begin, l.end});
+        vp::slabs::column_parities columns(g, ranges);
+        for (const mesh_data& m : meshes)
+            for (const glm::uvec3& t : m.triangles) {
+                const auto at = [&](std::uint32_t v) {
+                    const glm::vec3 p = m.positions[v];
+                    return vp::core::snap(snap, p.x, p.y, p.z);
+                };
+                columns.add(at(t.x), at(t.y), at(t.z));
+            }
+        vp::solid_options options{.repair = vp::repair::vote};
+        vp::cpu_backend cpu;
+        bit_target<vp::cpu_backend> whole{cpu, g.extent};
+        ASSERT_TRUE(bits.draw(cpu, whole, g, options, loading::clear).ok());
+        const auto expected = vp::get<0>(whole).to_host_target(cpu);
+        for (std::size_t s = 0; s < std::size(slab_layers); ++s) {
+            const layers& at = slab_layers[s];
+            const vp::solid_slab decided = columns.of(s);
+            options.slab = &decided;
+            expect_slab(bits, g, at, options, expected);
+            const vp::grid slab = g.crop({0, 0, at.begin}, {g.extent.x, g.extent.y, at.end - at.begin});
+            bits.expect_same(slab, options);
+            all.expect_same(slab, options, loading::load);
+        }
+    }
+}
+
+TEST(Solids, SlabsOfAnExterior) {
+    const drawing_of_everything all{broken_meshes(), {{0.0f}}, {{1, 0.1f}}};
+    const drawing_of_bits bits{broken_meshes(), {{}}, {{true}}};
+    const vp::grid g = box_grid({70, 26, 20});
+    for (const int closing : {0, 2}) {
+        vp::solid_options options{.repair = vp::repair::exterior, .closing = closing};
+        vp::cpu_backend cpu;
+        bit_target<vp::cpu_backend> whole{cpu, g.extent};
+        ASSERT_TRUE(bits.draw(cpu, whole, g, options, loading::clear).ok());
+        const auto expected = vp::get<0>(whole).to_host_target(cpu);
+        for (const layers& at : slab_layers) {
+            const vp::grid slab = g.crop({0, 0, at.begin}, {g.extent.x, g.extent.y, at.end - at.begin});
+            std::vector<std::uint64_t> inside(std::size_t{2} * 26 * static_cast<std::size_t>(slab.extent.z));
+            for (int z = 0; z < slab.extent.z; ++z)
+                for (int y = 0; y < 26; ++y)
+                    for (int x = 0; x < 70; ++x)
+                        if (expected(x, y, at.begin + z))
+                            inside[static_cast<std::size_t>((z * 26 + y) * 2 + x / 64)] |= std::uint64_t{1} << x % 64;
+            vp::solid_slab decided;
+            decided.inside = inside.data();
+            options.slab = &decided;
+            expect_slab(bits, g, at, options, expected);
+            bits.expect_same(slab, options);
+            all.expect_same(slab, options, loading::load);
+            expect_same_lists<std::uint32_t>(broken_meshes(), id_of_fragment{5}, slab, options);
+        }
+    }
 }
 
 // The whole of a maze is reached, whatever the number of turns.

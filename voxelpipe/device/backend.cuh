@@ -48,6 +48,8 @@ template <class Payload, class... Targets>
 // each. They may share meshes that nobody changes, once the stream that made these has been waited for.
 class cuda_backend : public stream_memory {
 public:
+    static constexpr bool takes_solid_slabs = true; // its solid calls take solid_options::slab
+
     // Device memory of the backend; see device_buffer.
     template <class T>
     using buffer = device_buffer<T>;

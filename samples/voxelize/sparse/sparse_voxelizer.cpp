@@ -10,7 +10,7 @@
 #include "streamed_model.hpp"
 
 #include <cpu_ref/backend.hpp>
-#include <cpu_ref/slab_exterior.hpp>
+#include <voxelpipe/slabs/exterior.hpp>
 
 #include <algorithm>
 #include <new>
@@ -96,7 +96,7 @@ sparse_volume draw_in_slabs(const scene& model, const voxelize_request& request,
     const int depth = std::max(1, static_cast<int>(room / 4 / layer_bytes(request)) / brick) * brick;
     const bool floods = request.solid->rule == solid_rule::exterior;
     const int first_layer = padding, last_layer = whole.extent.z - padding;
-    std::optional<vp::cpu::slab_exterior> exterior;
+    std::optional<vp::slabs::slab_exterior> exterior;
     double done = 0;
     const double share_of_walls = floods ? 0.3 : 0;
     const auto report = [&](voxelize_request& part, double share) {
@@ -104,7 +104,7 @@ sparse_volume draw_in_slabs(const scene& model, const voxelize_request& request,
         done += share;
     };
     if (floods) {
-        memory::require(vp::cpu::slab_exterior::least_bytes(whole.extent, request.solid->closing),
+        memory::require(vp::slabs::slab_exterior::least_bytes(whole.extent, request.solid->closing),
                         "the flood of --solid exterior");
         exterior.emplace(whole.extent, request.solid->closing, static_cast<std::uint64_t>(room / 8), folder.string(),
                          static_cast<unsigned>(thread_count(request.threads)));
@@ -120,7 +120,7 @@ sparse_volume draw_in_slabs(const scene& model, const voxelize_request& request,
         part.grid = whole.crop({padding, padding, begin},
                                {whole.extent.x - 2 * padding, whole.extent.y - 2 * padding, end - begin});
         report(part, (1 - share_of_walls) * (end - begin) / (last_layer - first_layer));
-        std::optional<vp::cpu::bit_grid> inside;
+        std::optional<vp::core::bit_grid> inside;
         vp::solid_slab decided;
         if (floods) {
             inside = exterior->inside(part.grid.offset, part.grid.extent);

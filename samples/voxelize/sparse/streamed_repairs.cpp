@@ -24,7 +24,7 @@ streamed_repairs::streamed_repairs(const triangle_stream& model, const voxelize_
     for (const triangle_stream::part& p : model.parts()) places_.emplace_back(p.to_world, reference);
     if (!floods_) return;
     const glm::ivec3 extent = request.grid.extent;
-    memory::require(vp::cpu::slab_exterior::least_bytes(extent, request.solid->closing),
+    memory::require(vp::slabs::slab_exterior::least_bytes(extent, request.solid->closing),
                     "the flood of --solid exterior");
     exterior_.emplace(extent, request.solid->closing, static_cast<std::uint64_t>(room / 8), folder.string(),
                       static_cast<unsigned>(thread_count(request.threads)));

@@ -2,15 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // --solid exterior and --vote for a model that is read block by block: what the slabs, which are drawn one by one, need
-// of each other. A flood takes the walls of all slabs first (cpu_ref/slab_exterior.hpp), a vote the crossings of all
+// of each other. A flood takes the walls of all slabs first (voxelpipe/slabs/exterior.hpp), a vote the crossings of all
 // triangles with the columns (voxelpipe/slabs/columns.hpp).
 
 #include "../surface.hpp"
 #include "../triangle_stream.hpp"
 #include "../voxelizer.hpp"
 
-#include <cpu_ref/slab_exterior.hpp>
 #include <voxelpipe/slabs/columns.hpp>
+#include <voxelpipe/slabs/exterior.hpp>
 #include <voxelpipe/slabs/plan.hpp>
 #include <voxelpipe/solid.hpp>
 
@@ -57,8 +57,8 @@ private:
     std::vector<voxelpipe::slabs::layer_range> slabs_; // of inner_, not empty
     std::size_t next_ = 0;
     std::optional<voxelpipe::slabs::column_parities> columns_;
-    std::optional<vp::cpu::slab_exterior> exterior_;
-    std::optional<vp::cpu::bit_grid> inside_; // of the slab that was asked for
+    std::optional<vp::slabs::slab_exterior> exterior_;
+    std::optional<vp::core::bit_grid> inside_; // of the slab that was asked for
 };
 
 } // namespace voxelize

@@ -37,6 +37,16 @@ struct bit_box {
     }
 };
 
+// Copies the lowest layers of a box from host memory, where a row begins with a new word of 64 bits (solid_slab).
+inline void copy_rows_to_device(word* to, const std::uint64_t* from, const bit_box& box, int layers,
+                                cudaStream_t stream) {
+    const std::size_t row = box.words_x() * sizeof(word), host_row = (row + 7) / 8 * 8;
+    check(cudaMemcpy2DAsync(to, row, from, host_row, row,
+                            static_cast<std::size_t>(box.extent.y) * static_cast<std::size_t>(layers),
+                            cudaMemcpyHostToDevice, stream),
+          stage::fine_raster);
+}
+
 // A word's place.
 struct word_at_box {
     std::uint32_t word_x;

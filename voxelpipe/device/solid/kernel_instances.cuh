@@ -27,7 +27,7 @@
     HOW void take_counts<0>(const cover_memory&, pipeline_state*, cudaStream_t);                                       \
     HOW void fill_to_exterior<0>(const exterior_memory&, word*, cudaStream_t);                                         \
     HOW void add_votes<0>(const vote_memory&, const stored_triangles&, std::uint32_t, std::uint32_t, const row_grid&,  \
-                          word*, pipeline_state*, cudaStream_t);
+                          const solid_slab*, word*, pipeline_state*, cudaStream_t);
 
 #if defined(VOXELPIPE_LINKS_CUDA_KERNELS)
 namespace voxelpipe::device {

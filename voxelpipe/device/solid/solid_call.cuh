@@ -116,7 +116,7 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         if (use == crossing_use::groups)
             m.by_row = row_groups::take(a, plan.limits.fragments, rows().num_rows(), counts);
         if (has_cover()) m.cover = cover_memory::take(a, most, plan.g, plan.limits);
-        if (plan.options.repair == repair::exterior)
+        if (plan.options.repair == repair::exterior && plan.options.slab == nullptr)
             m.exterior = exterior_memory::take(a, plan.g.extent, plan.options.closing);
         if (plan.options.repair == repair::vote) m.vote = vote_memory::take(a, plan.g.extent);
         return m;
@@ -244,13 +244,16 @@ private:
         m.cover.start(stream);
         for_each_body([&](std::uint32_t body, std::size_t first, std::size_t last) {
             cover_body(m, geo, geometry_of, body, first, last, state, stream);
-            if (plan.options.repair == repair::exterior) {
+            if (plan.options.repair == repair::exterior && plan.options.slab != nullptr) {
+                // The cover has counted the triangles; the inside is known.
+                copy_rows_to_device(m.cover.mask, plan.options.slab->inside, {plan.g.extent}, plan.g.extent.z, stream);
+            } else if (plan.options.repair == repair::exterior) {
                 fill_to_exterior(m.exterior, m.cover.mask, stream);
             } else {
                 const std::uint32_t begin = geometry_of[first].first_primitive,
                                     end = last < draws.size() ? geometry_of[last].first_primitive : plan.num_primitives;
                 add_votes(m.vote, stored_triangles{geo, rows(), plan.num_primitives, plan.num_primitives}, begin,
-                          end - begin, rows(), m.cover.mask, state, stream);
+                          end - begin, rows(), plan.options.slab, m.cover.mask, state, stream);
             }
             if (m.by_row.counts == nullptr) list_cover(m.cover, rows(), list, body, state, stream);
         });

@@ -6,6 +6,7 @@
 
 #include <voxelpipe/device/solid/bit_sweeps.cuh>
 #include <voxelpipe/device/solid/emit_crossings.cuh>
+#include <voxelpipe/solid.hpp>
 
 #include <cstdint>
 
@@ -37,14 +38,15 @@ struct parity_masks {
 };
 
 // Changes the bit of the first voxel behind each crossing along an axis, and that of its row. A warp takes a triangle,
-// a lane every 32nd line of its rows. Along x triangles and crossings are counted.
+// a lane every 32nd line of its rows. Along x triangles and crossings are counted. is_slab: the box is a slab along z,
+// whose columns begin with the parity below it, and are known to be open or not (solid_options::slab).
 template <int Axis, class State>
 __global__ __launch_bounds__(threads_per_block,
                              2) void toggle_along_kernel(const __grid_constant__ stored_triangles source,
                                                          std::uint32_t first_triangle, std::uint32_t num_triangles,
                                                          const __grid_constant__ row_grid grid,
-                                                         const __grid_constant__ bit_box box, word* inside, word* open,
-                                                         State* state) {
+                                                         const __grid_constant__ bit_box box, bool is_slab,
+                                                         word* inside, word* open, State* state) {
     using core::triangle_class;
     const std::uint32_t lane = threadIdx.x % 32;
     const core::voxel_box whole = grid.whole_box();
@@ -62,12 +64,15 @@ __global__ __launch_bounds__(threads_per_block,
         const triangle_class kind = core::classify_for_rows(p[0], p[1], p[2], grid.fraction, whole, true);
         if (lane == 0) ++classes[static_cast<int>(kind)];
         if (kind != triangle_class::drawn) continue;
+        if constexpr (Axis == 2) // crossings below the slab are in its parities
+            if (is_slab && core::bounds(p[0], p[1], p[2], grid.fraction).hi[2] < 0) continue;
         const core::row_box rows = core::rows_within<Axis>(p[0], p[1], p[2], grid.fraction, whole);
         for (std::int64_t v = rows.v.lo + lane; v <= rows.v.hi; v += 32)
             core::for_each_crossing<Axis, core::centre_offset<>>(
                 p[0], p[1], p[2], grid.fraction, {rows.u, {v, v}},
                 [&](std::int64_t u, std::int64_t, std::int64_t first, int) {
                     ++crossings;
+                    if (Axis == 2 && is_slab && first < 0) return;
                     const int n = Axis == 0 ? box.extent.x : Axis == 1 ? box.extent.y : box.extent.z;
                     const auto w = static_cast<int>(first < 0 ? 0 : first < n ? first : n);
                     const auto q = core::to_xyz(Axis, static_cast<int>(u), static_cast<int>(v), w);
@@ -75,7 +80,7 @@ __global__ __launch_bounds__(threads_per_block,
                     if constexpr (Axis == 0) {
                         const std::uint64_t row = grid.row(q[1], q[2]);
                         atomicXor(open + row / 32, 1u << row % 32);
-                    } else {
+                    } else if (Axis == 1 || !is_slab) {
                         atomicXor(open + static_cast<std::uint64_t>(Axis == 1 ? q[2] : q[1]) * box.words_x() +
                                       q[0] / 32,
                                   1u << q[0] % 32);
@@ -166,18 +171,23 @@ struct vote_memory {
     }
 };
 
-// Joins what the triangles of a body vote for to the mask of its cover.
+// Joins what the triangles of a body vote for to the mask of its cover. slab: null, or the bits of its columns.
 template <int = 0>
 void add_votes(const vote_memory& m, const stored_triangles& source, std::uint32_t first_triangle,
-               std::uint32_t num_triangles, const row_grid& grid, word* mask, pipeline_state* state,
-               cudaStream_t stream) {
+               std::uint32_t num_triangles, const row_grid& grid, const solid_slab* slab, word* mask,
+               pipeline_state* state, cudaStream_t stream) {
     const bit_box& box = m.box;
     const parity_masks& masks = m.masks;
     masks.clear(box, stream);
+    if (slab != nullptr) {
+        copy_rows_to_device(masks.inside[2], slab->below, box, 1, stream);
+        copy_rows_to_device(masks.open[2], slab->open, box, 1, stream);
+    }
     const unsigned blocks = fill_device(std::uint64_t{num_triangles} * 32, 4);
     const auto toggle = [&]<int Axis>() {
-        toggle_along_kernel<Axis, pipeline_state><<<blocks, threads_per_block, 0, stream>>>(
-            source, first_triangle, num_triangles, grid, box, masks.inside[Axis], masks.open[Axis], state);
+        toggle_along_kernel<Axis, pipeline_state>
+            <<<blocks, threads_per_block, 0, stream>>>(source, first_triangle, num_triangles, grid, box,
+                                                       slab != nullptr, masks.inside[Axis], masks.open[Axis], state);
         check(cudaGetLastError(), stage::coarse_raster);
     };
     toggle.template operator()<0>();

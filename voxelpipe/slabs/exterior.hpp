@@ -7,7 +7,7 @@
 // What it reaches is a set, so the order does not show: the bits are those of a flood of the whole grid. A path that
 // winds up and down takes as many sweeps as it has turns. Needs POSIX files.
 
-#include <cpu_ref/solid_repair.hpp>
+#include <voxelpipe/core/bit_grid.hpp>
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/slabs/bins.hpp>
 
@@ -19,7 +19,7 @@
 #include <utility>
 #include <vector>
 
-namespace voxelpipe::cpu {
+namespace voxelpipe::slabs {
 
 // One body. Members throw std::bad_alloc, and std::system_error of files.
 class slab_exterior {
@@ -36,6 +36,7 @@ public:
         const int layers = 5 * brick + 2 * closing + 4 * ((extent.z + brick - 1) / brick);
         return layer_bytes(extent + 2 * (closing + 1)) * layers;
     }
+    // Slabs of its own, by the budget.
     [[nodiscard]] std::size_t num_slabs() const { return slabs_.size(); }
     // Slabs that have been flooded, those counted again that were more than once.
     [[nodiscard]] std::uint64_t num_visits() const { return visits_; }
@@ -59,18 +60,18 @@ public:
     }
 
     // The voxels of a box of the grid that are inside, after flood(). Cheapest by ascending z.
-    [[nodiscard]] bit_grid inside(const glm::ivec3& begin, const glm::ivec3& size) {
+    [[nodiscard]] core::bit_grid inside(const glm::ivec3& begin, const glm::ivec3& size) {
         const int ring = closing_ + 1, low = begin.z + ring, high = low + size.z; // padded layers
         const int first = std::max(0, low - closing_), last = std::min(padded_.z, high + closing_);
-        bit_grid outside({padded_.x, padded_.y, last - first});
+        core::bit_grid outside({padded_.x, padded_.y, last - first});
         for (std::size_t s = 0; s < slabs_.size(); ++s) {
             const int from = std::max(first, first_layer(s)), to = std::min(last, last_layer(s));
             if (from >= to) continue;
-            const bit_grid& reached = reached_in(s);
+            const core::bit_grid& reached = reached_in(s);
             for (int z = from; z < to; ++z) copy_layer(reached, z - first_layer(s), outside, z - first);
         }
-        dilate(outside, closing_, threads_);
-        bit_grid result(size);
+        core::dilate(outside, closing_, threads_);
+        core::bit_grid result(size);
         for (int z = 0; z < size.z; ++z)
             for (int y = 0; y < size.y; ++y)
                 for (int x = 0; x < size.x; x += 32) {
@@ -114,16 +115,16 @@ private:
     [[nodiscard]] int last_layer(std::size_t s) const {
         return s + 1 == slabs_.size() ? padded_.z : first_layer(s + 1);
     }
-    static void copy_layer(const bit_grid& from, int at, bit_grid& to, int to_at) {
+    static void copy_layer(const core::bit_grid& from, int at, core::bit_grid& to, int to_at) {
         const std::size_t words = from.words() * static_cast<std::size_t>(from.extent().y);
         std::copy_n(from.row(0, at), words, to.row(0, to_at));
     }
 
     // The walls of a slab, grown by `closing`.
-    [[nodiscard]] bit_grid walls_of(std::size_t slab) const {
+    [[nodiscard]] core::bit_grid walls_of(std::size_t slab) const {
         const int first = std::max(0, first_layer(slab) - closing_),
                   last = std::min(padded_.z, last_layer(slab) + closing_), ring = closing_ + 1;
-        bit_grid walls({padded_.x, padded_.y, last - first});
+        core::bit_grid walls({padded_.x, padded_.y, last - first});
         for (std::size_t s = 0; s < slabs_.size(); ++s) {
             if (last_layer(s) <= first || first_layer(s) >= last) continue;
             bins_[s].for_each_block([&](std::span<const wall_brick> bricks) {
@@ -137,7 +138,7 @@ private:
                 }
             });
         }
-        dilate(walls, closing_, threads_);
+        core::dilate(walls, closing_, threads_);
         walls.keep_layers(first_layer(slab) - first, last_layer(slab) - first_layer(slab));
         return walls;
     }
@@ -151,15 +152,15 @@ private:
     }
 
     // What is reached in a slab from around the grid and from its neighbours, as far as these are known.
-    [[nodiscard]] bit_grid flooded(std::size_t s, const bit_grid& walls) const {
-        bit_grid reached(walls.extent());
-        set_faces(reached, s == 0, s + 1 == slabs_.size());
+    [[nodiscard]] core::bit_grid flooded(std::size_t s, const core::bit_grid& walls) const {
+        core::bit_grid reached(walls.extent());
+        core::set_faces(reached, s == 0, s + 1 == slabs_.size());
         if (s > 0) enter(slabs_[s - 1].reached[1], walls, reached, 0);
         if (s + 1 < slabs_.size()) enter(slabs_[s + 1].reached[0], walls, reached, walls.extent().z - 1);
-        spread(walls, reached);
+        core::spread(walls, reached);
         return reached;
     }
-    static void enter(const face& from, const bit_grid& walls, bit_grid& reached, int z) {
+    static void enter(const face& from, const core::bit_grid& walls, core::bit_grid& reached, int z) {
         const std::uint64_t* const w = walls.row(0, z);
         std::uint64_t* const r = reached.row(0, z);
         for (std::size_t i = 0; i < from.size(); ++i) r[i] |= from[i] & ~w[i];
@@ -179,7 +180,7 @@ private:
     bool visit_if_needed(std::size_t s) {
         if (!has_news(s)) return false;
         ++visits_;
-        const bit_grid walls = walls_of(s), reached = flooded(s, walls);
+        const core::bit_grid walls = walls_of(s), reached = flooded(s, walls);
         const std::size_t words = walls.words() * static_cast<std::size_t>(padded_.y);
         for (const int end : {0, 1}) {
             const int z = end == 0 ? 0 : walls.extent().z - 1;
@@ -194,7 +195,7 @@ private:
     }
 
     // All that is reached in a slab, after the flood; two are kept.
-    [[nodiscard]] const bit_grid& reached_in(std::size_t s) {
+    [[nodiscard]] const core::bit_grid& reached_in(std::size_t s) {
         if (const auto found = kept_.find(s); found != kept_.end()) return found->second;
         if (kept_.size() > 1) kept_.erase(kept_.begin());
         return kept_.emplace(s, flooded(s, walls_of(s))).first->second;
@@ -205,10 +206,10 @@ private:
     unsigned threads_;
     int depth_; // layers of the grid a slab, a multiple of a brick's
     std::vector<slab_faces> slabs_;
-    std::vector<slabs::bin<wall_brick>> bins_;
-    slabs::bin_memory<wall_brick> walls_;
+    std::vector<bin<wall_brick>> bins_;
+    bin_memory<wall_brick> walls_;
     std::uint64_t visits_ = 0;
-    std::map<std::size_t, bit_grid> kept_;
+    std::map<std::size_t, core::bit_grid> kept_;
 };
 
-} // namespace voxelpipe::cpu
+} // namespace voxelpipe::slabs
