@@ -28,10 +28,17 @@ void mark_first(std::int64_t rows, std::int64_t words, bool from_high, const Wor
 
 } // namespace
 
-std::vector<std::uint8_t> sides_that_see(const volume& v, const channel& bits, int threads) {
-    std::vector<std::uint8_t> sides(static_cast<std::size_t>(v.num_voxels()));
-    const auto mark = [&](std::int64_t i, std::int64_t j, std::int64_t k, int side) {
-        sides[static_cast<std::size_t>(v.index(i, j, k))] |= static_cast<std::uint8_t>(1 << side);
+column_table columns_of(const volume& v, const channel& bits, const glm::ivec3& low, int threads) {
+    column_table table;
+    table.low = low;
+    for (int a = 0; a < 3; ++a) table.extent[a] = static_cast<int>(v.extent[static_cast<std::size_t>(a)]);
+    for (std::size_t a = 0; a < 3; ++a)
+        table.along[a].resize(static_cast<std::size_t>(v.extent[a == 0 ? 1 : 0]) *
+                              static_cast<std::size_t>(v.extent[a == 2 ? 1 : 2]));
+    const column_view place = table.view();
+    const auto mark = [&](std::int64_t i, std::int64_t j, std::int64_t k, int axis) {
+        const glm::ivec3 voxel = low + glm::ivec3(static_cast<int>(i), static_cast<int>(j), static_cast<int>(k));
+        table.along[static_cast<std::size_t>(axis)][place.column(axis, voxel)].add(voxel[axis]);
     };
     const std::int64_t words = v.words_per_row();
     // Layers of constant z: along x and along y.
@@ -43,12 +50,12 @@ std::vector<std::uint8_t> sides_that_see(const volume& v, const channel& bits, i
             if (first == words) continue;
             while (v.word(bits, last, j, k) == 0) --last;
             mark(32 * first + std::countr_zero(v.word(bits, first, j, k)), j, k, 0);
-            mark(32 * last + 31 - std::countl_zero(v.word(bits, last, j, k)), j, k, 1);
+            mark(32 * last + 31 - std::countl_zero(v.word(bits, last, j, k)), j, k, 0);
         }
         for (const bool high : {false, true})
             mark_first(
                 v.extent[1], words, high, [&](std::int64_t j, std::int64_t w) { return v.word(bits, w, j, k); },
-                [&](std::int64_t j, std::int64_t i) { mark(i, j, k, high ? 3 : 2); });
+                [&](std::int64_t j, std::int64_t i) { mark(i, j, k, 1); });
     });
     // Layers of constant y: along z.
     parallel_for(static_cast<std::size_t>(v.extent[1]), thread_count(threads), [&](std::size_t layer) {
@@ -56,9 +63,9 @@ std::vector<std::uint8_t> sides_that_see(const volume& v, const channel& bits, i
         for (const bool high : {false, true})
             mark_first(
                 v.extent[2], words, high, [&](std::int64_t k, std::int64_t w) { return v.word(bits, w, j, k); },
-                [&](std::int64_t k, std::int64_t i) { mark(i, j, k, high ? 5 : 4); });
+                [&](std::int64_t k, std::int64_t i) { mark(i, j, k, 2); });
     });
-    return sides;
+    return table;
 }
 
 } // namespace voxelize

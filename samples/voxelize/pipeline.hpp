@@ -97,16 +97,13 @@ public:
         if (wants(target::normal)) count_cancelled_normals(result);
         if (wants(target::color_outer)) {
             const voxelize_stats counted = stats_; // the same fragments again
-            const std::vector<std::uint8_t> sides = outer_sides(result);
-            constexpr double voxel_bytes = sizeof(std::uint64_t) + sizeof(std::uint8_t);
-            for_each_slab(0, layers, slab_depth(voxel_bytes),
+            const std::vector<buffer<column_ends>> ends = put_columns(result);
+            for_each_slab(0, layers, slab_depth(sizeof(std::uint64_t)),
                           [&](const voxelpipe::grid& part, int begin, int slab, int slabs) {
                               report_from(1, slab, slabs);
-                              draw_outer(result, part, begin, sides);
+                              draw_outer(result, part, begin);
                           });
-            std::vector<std::pair<std::string, double>> times = std::move(stats_.milliseconds);
-            stats_ = counted;
-            stats_.milliseconds = std::move(times);
+            restore_counts(counted);
         }
         if (request_.solid) {
             if (!wants(target::occupancy)) result.add_unset(inside_name_, scalar::bit);
@@ -293,9 +290,20 @@ protected: // sparse_pipeline draws the same into bricks
     // ---- color-outer: the whole of the grid is known
     // -----------------------------------------------------------------
 
-    [[nodiscard]] std::vector<std::uint8_t> outer_sides(const volume& result);
+    void make_outer_draws();
+    // Ends of the columns, for the draws.
+    void set_columns(const column_view& columns);
+    // Makes the draws, with the ends of the result's columns. The draws read what is returned.
+    [[nodiscard]] std::vector<buffer<column_ends>> put_columns(const volume& result);
 
-    void draw_outer(volume& result, const voxelpipe::grid& part, int begin, const std::vector<std::uint8_t>& sides);
+    void draw_outer(volume& result, const voxelpipe::grid& part, int begin);
+
+    // Takes the counts back to what they were; the times go on.
+    void restore_counts(const voxelize_stats& counted) {
+        std::vector<std::pair<std::string, double>> times = std::move(stats_.milliseconds);
+        stats_ = counted;
+        stats_.milliseconds = std::move(times);
+    }
 
     // ---- solids ----------------------------------------------------------------------------------------------------
 

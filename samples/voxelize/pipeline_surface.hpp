@@ -59,36 +59,39 @@ void pipeline<Backend>::draw_surface(volume& result, const voxelpipe::grid& part
 }
 
 template <class Backend>
-std::vector<std::uint8_t> pipeline<Backend>::outer_sides(const volume& result) {
-    const stage_timer timer{*this, "outside"};
+void pipeline<Backend>::make_outer_draws() {
+    outer_draws_.clear();
+    outer_line_draws_.clear();
     const auto& draws = uploaded_->draws();
     for (std::size_t i = 0; i < draws.size(); ++i)
         outer_draws_.push_back(
             {draws[i].mesh, draws[i].vertex_shader, {draws[i].fragment_shader, uploaded_->double_sided()[i] != 0}});
     for (const auto& d : uploaded_->line_draws())
         outer_line_draws_.push_back({d.mesh, d.vertex_shader, {{d.fragment_shader.of_triangles}}});
-    return sides_that_see(result, *result.find(bits_name_), request_.threads);
 }
 
 template <class Backend>
-void pipeline<Backend>::draw_outer(volume& result, const voxelpipe::grid& part, int begin,
-                                   const std::vector<std::uint8_t>& sides) {
-    const std::size_t layer = static_cast<std::size_t>(part.extent.x) * static_cast<std::size_t>(part.extent.y);
-    const buffer<std::uint8_t> of_slab{backend_,
-                                       std::span{sides}.subspan(layer * static_cast<std::size_t>(begin),
-                                                                layer * static_cast<std::size_t>(part.extent.z))};
-    for (outer_draw& draw : outer_draws_) {
-        draw.fragment_shader.sides = of_slab.data();
-        draw.fragment_shader.first = part.offset;
-        draw.fragment_shader.extent = part.extent;
-    }
+void pipeline<Backend>::set_columns(const column_view& columns) {
+    for (outer_draw& draw : outer_draws_) draw.fragment_shader.columns = columns;
+    for (outer_line_draw& draw : outer_line_draws_) draw.fragment_shader.of_triangles.columns = columns;
+}
+
+template <class Backend>
+auto pipeline<Backend>::put_columns(const volume& result) -> std::vector<buffer<column_ends>> {
+    const stage_timer timer{*this, "outside"};
+    const column_table table = columns_of(result, *result.find(bits_name_), request_.grid.offset, request_.threads);
+    std::vector<buffer<column_ends>> ends;
+    column_view view{table.low, table.extent};
+    for (std::size_t a = 0; a < 3; ++a) view.along[a] = ends.emplace_back(backend_, table.along[a]).data();
+    make_outer_draws();
+    set_columns(view);
+    return ends;
+}
+
+template <class Backend>
+void pipeline<Backend>::draw_outer(volume& result, const voxelpipe::grid& part, int begin) {
     std::bitset<1> all;
     all.set();
-    for (outer_line_draw& draw : outer_line_draws_) {
-        draw.fragment_shader.of_triangles.sides = of_slab.data();
-        draw.fragment_shader.of_triangles.first = part.offset;
-        draw.fragment_shader.of_triangles.extent = part.extent;
-    }
     if (draws_lines_) outer_framebuffer_.reset();
     outer_framebuffer& framebuffer = framebuffer_for(outer_framebuffer_, part.extent, all);
     draw_reporting(outer_draws_, part, framebuffer);

@@ -139,6 +139,7 @@ std::unique_ptr<ply_file> ply_file::open(const std::filesystem::path& path, std:
 ply_file::ply_file(const std::filesystem::path& path, const layout& header, std::uint64_t room)
     : header_(header), file_(path), vertices_(header.vertices, header.colors ? room / 2 : room) {
     add_only_part(path, header.num_faces);
+    materials_[0].double_sided = true; // as its loader has it
     if (header.colors) colors_.emplace(*header.colors, room / 2);
 }
 

@@ -6,7 +6,7 @@
 #include "formats/output_file.hpp"
 #include "memory.hpp"
 #include "slab_output.hpp"
-#include "sparse/sparse_voxelizer.hpp"
+#include "sparse/loaded_slabs.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -126,19 +126,6 @@ volume shape_of(const voxelize_request& request, std::size_t num_targets) {
     return v;
 }
 
-// The bricks of a slab that a loaded model reaches.
-sparse_volume draw_loaded(const scene& model, const voxelize_request& request, const slabs::layer_range& layers,
-                          voxelize_stats& stats) {
-    const int padding = request.padding;
-    const voxelpipe::grid& whole = request.grid;
-    const int begin = std::max(layers.begin, padding), end = std::min(layers.end, whole.extent.z - padding);
-    scene copy = begin < end ? model : scene{}; // drawing takes its arrays
-    voxelize_request part = request;
-    part.grid = whole.crop({padding, padding, std::min(begin, end)},
-                           {whole.extent.x - 2 * padding, whole.extent.y - 2 * padding, std::max(1, end - begin)});
-    return draw_sparse(copy, part, whole, stats);
-}
-
 } // namespace
 
 std::string why_not_by_slabs(const command_line& options) {
@@ -147,9 +134,6 @@ std::string why_not_by_slabs(const command_line& options) {
     if (options.storage == storage_choice::dense || request.backend == backend_choice::cuda || request.devices != 1 ||
         request.strategy != voxelpipe::strategy::automatic)
         return "the CPU and bricks: no --dense, --backend cuda, --devices or --strategy";
-    if (request.wants(target::color_outer)) return "no --target color-outer, which sees the whole grid at once";
-    if (request.solid && request.wants_colors() && !request.solid->fill_color)
-        return "--fill-color '#rrggbb' where a solid has colours, since their mean is that of the whole grid";
     return "";
 }
 
@@ -163,11 +147,12 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
     outcome.slabs = output->num_slabs();
 
     std::vector<std::int64_t> mine;
-    std::vector<slabs::layer_range> ranges;
+    std::vector<slabs::layer_range> all_ranges, ranges; // ranges: of `mine`
+    for (std::int64_t s = 0; s < outcome.slabs; ++s) all_ranges.push_back(output->layers(s));
     for (std::int64_t s = options.batch.rank; s < outcome.slabs; s += options.batch.world_size) {
         if (folder.has(s)) continue;
         mine.push_back(s);
-        ranges.push_back(output->layers(s));
+        ranges.push_back(all_ranges[static_cast<std::size_t>(s)]);
     }
     voxelize_stats before;
     const auto write = [&](std::size_t i, sparse_volume&& bricks, const voxelize_stats& until) {
@@ -184,23 +169,19 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
     if (source.stream != nullptr && !ranges.empty()) {
         draw_streamed(*source.stream, source.place, request, ranges, stats,
                       [&](std::size_t i, sparse_volume&& bricks) { write(i, std::move(bricks), stats); });
-    } else {
-        stats.triangles = source.model.triangle_count();
+    } else if (!ranges.empty()) {
+        const std::filesystem::path& place = source.place.folder;
         try {
-            for (std::size_t i = 0; i < ranges.size(); ++i) {
-                voxelize_stats part;
-                sparse_volume bricks = draw_loaded(source.model, request, ranges[i], part);
-                add_part(stats, part);
-                stats.backend = part.backend;
-                stats.threads = part.threads;
-                stats.triangles_dropped = part.triangles_dropped;
-                ++stats.slabs;
-                write(i, std::move(bricks), stats);
-            }
+            loaded_slabs model(std::move(source.model), request, all_ranges, ranges.size(), place);
+            for (std::size_t i = 0; i < ranges.size(); ++i) write(i, model.draw(ranges[i], stats), stats);
             warn_of_parts(stats, request);
+        } catch (const std::system_error& error) {
+            throw write_error(place, "temporary files for a flood: " + error.code().message());
         } catch (const std::bad_alloc&) {
             throw memory_error(memory::shortage(memory::fewer_voxels_hint));
         }
+    } else {
+        stats.triangles = source.stream != nullptr ? source.stream->num_triangles() : source.model.triangle_count();
     }
     for (std::int64_t s = 0; s < outcome.slabs; ++s) outcome.left += folder.has(s) ? 0 : 1;
     if (outcome.left != 0) return outcome;

@@ -3,6 +3,7 @@
 #pragma once
 // Solids: what --solid asks for, what it counts, and the values of the voxels inside, which no triangle touches.
 
+#include "targets.hpp"
 #include "volume.hpp"
 
 #include <array>
@@ -40,6 +41,9 @@ enum class solid_extent : std::uint8_t {
 [[nodiscard]] const char* to_string(solid_rule rule);
 [[nodiscard]] const char* to_string(solid_extent extent);
 
+// The colour of the voxels inside, of each target that is a colour.
+using fill_means = std::array<std::array<std::uint8_t, 4>, target_table.size()>;
+
 struct solid_request {
     solid_rule rule = solid_rule::nonzero;
     solid_extent extent = solid_extent::outer;
@@ -53,6 +57,8 @@ struct solid_request {
     const voxelpipe::solid_slab* slab = nullptr;
     // sRGB of the voxels inside; none: the mean of the model's covered voxels, in linear light, by alpha.
     std::optional<std::array<std::uint8_t, 3>> fill_color;
+    // Of a slab: the means of the whole grid, not owned. Null: the slab is all there is.
+    const fill_means* means = nullptr;
 };
 
 // As vp::solid_counters has them, of all slabs.

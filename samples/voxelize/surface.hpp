@@ -5,6 +5,7 @@
 // targets out. Base colour = factor * texture * vertex colour, in linear light. Plain functors over pointers, for every
 // backend; floats follow the rule of voxelpipe/core/exact.hpp, so the CPU and a GPU give the same bits.
 
+#include "outside.hpp"
 #include "scene.hpp"
 #include "srgb.hpp"
 
@@ -354,9 +355,7 @@ struct outer_fragment_shader {
 
     surface_fragment_shader surface;
     bool double_sided = false;
-    const std::uint8_t* sides = nullptr; // of sides_that_see(), for the part of the grid that is drawn
-    glm::ivec3 first{0};                 // its lowest voxel, in the whole grid
-    glm::ivec3 extent{0};                // and how many it has
+    column_view columns{}; // of a box in which the part of the grid lies that is drawn
 
     VOXELPIPE_HD auto operator()(const vp::fragment<surface_varyings>& f) const {
         const surface_varyings at = nearest_on_triangle(f, surface.centers);
@@ -371,11 +370,8 @@ struct outer_fragment_shader {
 private:
     [[nodiscard]] VOXELPIPE_HD std::uint32_t rank(const vp::fragment<surface_varyings>& f,
                                                   const surface_varyings& at) const {
-        const glm::ivec3 in_part = f.voxel - first;
-        const std::size_t row = static_cast<std::size_t>(in_part.z) * static_cast<std::size_t>(extent.y) +
-                                static_cast<std::size_t>(in_part.y);
-        const std::size_t voxel = row * static_cast<std::size_t>(extent.x) + static_cast<std::size_t>(in_part.x);
-        const unsigned seen_from = sides[voxel] != 0 ? sides[voxel] : 63U;
+        const unsigned sides = columns.sides_that_see(f.voxel);
+        const unsigned seen_from = sides != 0 ? sides : 63U;
         float along = 0.0f; // of the normal, from the centre to the plane
         for (int a = 0; a < 3; ++a) {
             const double from_center = vp::exact::to_double(at.position[a]) - surface.centers(a, f.voxel[a]);

@@ -39,9 +39,8 @@ public:
     // leaves the scene as it is. Lines have draws if `with_lines`.
     uploaded_scene(Backend& backend, scene& model, const voxelize_request& request, const wanted_targets& wanted,
                    bool with_lines)
-        : backend_{backend}, request_{request}, wanted_{wanted}, reference_{reference_point(request.grid)},
-          relative_grid_{request.grid}, tables_{backend, std::vector<color_tables>{make_color_tables()}} {
-        relative_grid_.origin -= reference_;
+        : backend_{backend}, request_{request}, wanted_{wanted},
+          reference_{reference_point(request.grid)}, tables_{backend, std::vector<color_tables>{make_color_tables()}} {
         upload_pictures(model);
         // A solid may be filled draw by draw.
         const std::uint64_t most_copies = request.solid ? 1 : UINT32_MAX;
@@ -71,8 +70,12 @@ public:
     [[nodiscard]] bool has_masks() const { return has_masks_; }
     // Positions are relative to this point; see reference_point.
     [[nodiscard]] const glm::dvec3& reference() const { return reference_; }
-    // The request's grid, its origin taken from there.
-    [[nodiscard]] const voxelpipe::grid& relative_grid() const { return relative_grid_; }
+    // The request's grid, its origin taken from there. The request may go on to another crop of the whole grid.
+    [[nodiscard]] voxelpipe::grid relative_grid() const {
+        voxelpipe::grid relative = request_.grid;
+        relative.origin -= reference_;
+        return relative;
+    }
 
 private:
     template <class T>
@@ -251,7 +254,7 @@ private:
         shader.base_color = m.base_color;
         shader.alpha = alpha_of(m, request_.alpha);
         shader.alpha_cutoff = m.alpha == alpha_mode::blend ? 0.5F : m.alpha_cutoff;
-        shader.centers = {relative_grid_.origin, relative_grid_.voxel_size};
+        shader.centers = {request_.grid.origin - reference_, request_.grid.voxel_size};
         shader.depth_axis = request_.depth_axis;
         shader.depth_reference = reference_[request_.depth_axis];
         shader.wanted = {wants(target::color), wants(target::color_max) || wants(target::color_replace),
@@ -263,7 +266,6 @@ private:
     const voxelize_request& request_;
     wanted_targets wanted_;
     glm::dvec3 reference_;
-    voxelpipe::grid relative_grid_;
     bool has_masks_ = false;
 
     buffer<color_tables> tables_;

@@ -39,7 +39,8 @@ enum class blend_alpha : std::uint8_t { weight, cutoff, ignore };
     return choice == blend_alpha::cutoff ? alpha_mode::mask : alpha_mode::opaque;
 }
 
-class cuda_start; // cuda_device.hpp
+class cuda_start;   // cuda_device.hpp
+struct column_ends; // outside.hpp
 
 struct voxelize_request {
     voxelpipe::grid grid;
@@ -59,6 +60,9 @@ struct voxelize_request {
     std::uint64_t device_memory = 0;      // most bytes to take of a GPU's memory; 0: all that is free
     std::shared_ptr<cuda_start> cuda;     // if CUDA is starting already; otherwise it starts when it is wanted
     std::function<void(double)> progress; // called with 0..1, one call at a time; may be empty
+    // color-outer of a slab along z: the ends of the columns along z in the whole grid, by x and y within the slab. Not
+    // owned. Null: the slab is all there is.
+    const column_ends* columns = nullptr;
 
     [[nodiscard]] bool wants(target id) const { return std::find(targets.begin(), targets.end(), id) != targets.end(); }
     [[nodiscard]] bool wants_colors() const { return std::any_of(targets.begin(), targets.end(), is_color); }

@@ -239,9 +239,7 @@ TEST(ToolSlabs, SaysWhatCannotBeDoneBySlabs) {
         return result.err;
     };
     EXPECT_NE(error("m.npz", {}).find("--resume needs one output, a .zarr or .pvti"), std::string::npos);
-    EXPECT_NE(error("m.zarr", {"-t", "color-outer"}).find("no --target color-outer"), std::string::npos);
     EXPECT_NE(error("m.zarr", {"--dense"}).find("no --dense"), std::string::npos);
-    EXPECT_NE(error("m.zarr", {"--solid", "nonzero", "-t", "color"}).find("--fill-color"), std::string::npos);
 }
 
 } // namespace

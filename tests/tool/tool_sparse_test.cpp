@@ -14,7 +14,8 @@ using namespace tool_test;
 
 namespace {
 
-constexpr const char* most_targets = "occupancy,count,color,color-max,color-replace,normal,material,triangle,depth";
+constexpr const char* all_targets =
+    "occupancy,count,color,color-max,color-replace,color-outer,normal,material,triangle,depth";
 
 // Voxels of the coords in the dense arrays, and nothing else in those.
 void expect_same_voxels(const scratch_folder& folder) {
@@ -39,7 +40,7 @@ void expect_same_voxels(const scratch_folder& folder) {
     }
     EXPECT_EQ(ranks.size(), covered);
     for (const voxelize::target_info& entry : voxelize::target_table) {
-        if (entry.id == voxelize::target::occupancy || entry.id == voxelize::target::color_outer) continue;
+        if (entry.id == voxelize::target::occupancy) continue;
         const std::string name(entry.name);
         const array dense = read_npy(folder / ("d." + name + ".npy")),
                     sparse = read_npy(folder / ("s." + name + ".npy"));
@@ -61,7 +62,7 @@ TEST(ToolSparse, HoldsTheVoxelsAndValuesOfADenseRun) {
             for (const std::string& padding : gltf_test::some_of<std::string>({"0", "5"}, 2)) {
                 const auto voxelize = [&](const char* out, const char* how) {
                     const outcome result =
-                        run(folder, {folder / model, "-o", folder / out, "-r", "48", "-t", most_targets, "--coverage",
+                        run(folder, {folder / model, "-o", folder / out, "-r", "48", "-t", all_targets, "--coverage",
                                      coverage, "--padding", padding, how});
                     ASSERT_EQ(0, result.code) << result.err;
                     EXPECT_EQ(std::string(how) == "--sparse",
@@ -90,7 +91,7 @@ TEST(ToolSparse, SolidsHoldTheVoxelsAndValuesOfADenseRun) {
                                                "-r",
                                                "40",
                                                "-t",
-                                               most_targets,
+                                               all_targets,
                                                sparse ? "--sparse" : "--dense"};
             arguments.insert(arguments.end(), solid.begin(), solid.end());
             const outcome result = run(folder, arguments);
@@ -201,11 +202,6 @@ TEST(ToolSparse, IsChosenWhereItHasToBeAndSaysSo) {
         arguments.emplace_back("--dense");
         EXPECT_EQ(3, voxelize(arguments).code);
     }
-    result = voxelize({"-o", folder / "a.npz", "-t", "color-outer", "--sparse"});
-    EXPECT_EQ(5, result.code) << result.err;
-    EXPECT_NE(std::string::npos, result.err.find("color-outer needs a dense grid")) << result.err;
-    result = voxelize({"-o", folder / "a.nvdb", "-t", "color-outer", "-r", "30"}); // by a dense grid
-    EXPECT_EQ(0, result.code) << result.err;
     result = voxelize({"-o", folder / "a.npz", "--sparse", "--dense"});
     EXPECT_EQ(1, result.code) << result.err;
 }

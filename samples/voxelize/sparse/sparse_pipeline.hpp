@@ -4,10 +4,12 @@
 
 // The tool's pipeline into a sparse framebuffer: the draws, targets and values of pipeline.hpp, resolved voxel by voxel
 // that exists, for a backend in host memory. Slab by slab, so that the sums of colours are held for one slab at a time.
-// A solid is drawn after its surface, the whole grid in one call.
+// A solid is drawn after its surface, the whole grid in one call. The request may be changed between calls to another
+// crop of its grid, with what that needs.
 
 #include "../memory.hpp"
 #include "../pipeline.hpp"
+#include "sparse_outside.hpp"
 #include "sparse_solid.hpp"
 #include "sparse_volume.hpp"
 
@@ -33,22 +35,37 @@ public:
 
     // `padding` layers of `whole`, which the request's grid is a part of, hold nothing.
     [[nodiscard]] sparse_volume run(const voxelpipe::grid& whole) {
-        if (this->wants(target::color_outer))
-            throw std::logic_error("color-outer needs a dense grid"); // the caller's to refuse
-        sparse_volume result;
-        result.shape = volume_of(whole);
-        const int passes = (this->draws_surface_ ? 1 : 0) + (this->request_.solid ? 1 : 0);
-        // A pass from `begin` to `end` of its work.
-        const auto report_from = [this, passes](int pass, double begin, double end) {
-            this->report_ = [=, this](double done) {
-                if (this->request_.progress) this->request_.progress((pass + begin + done * (end - begin)) / passes);
-            };
-        };
-        this->stats_.slabs = 1;
-        if (this->draws_surface_) draw_slabs(result, report_from);
+        sparse_volume result = surface_in(whole, this->num_passes());
         if (!this->request_.solid) return result;
-        report_from(passes - 1, 0, 1);
+        report_from(this->num_passes() - 1, this->num_passes(), 0, 1);
         return draw_solid(std::move(result));
+    }
+    // Without the solid.
+    [[nodiscard]] sparse_volume surface(const voxelpipe::grid& whole) {
+        return surface_in(whole, this->num_passes() - (this->request_.solid ? 1 : 0));
+    }
+    // The voxels that the surface occupies, without channels.
+    [[nodiscard]] sparse_volume occupied(const voxelpipe::grid& whole) {
+        if (!this->uploaded_->has_masks() && !this->draws_lines_) return walls(whole);
+        return bricks_of(whole, [this](const voxelpipe::grid& slab, std::uint64_t most, sparse_volume& part) {
+            std::bitset<base::num_targets> enabled;
+            enabled[base::occupancy] = true;
+            surface_bricks framebuffer(this->backend_, slab.extent, enabled);
+            if (!draw_surface_in(slab, framebuffer, enabled, most)) return false;
+            take_bricks(part, framebuffer);
+            return true;
+        });
+    }
+    // The voxels that triangles touch, whatever masks cut off.
+    [[nodiscard]] sparse_volume walls(const voxelpipe::grid& whole) {
+        return bricks_of(whole, [this](const voxelpipe::grid& slab, std::uint64_t most, sparse_volume& part) {
+            std::bitset<2> enabled;
+            enabled[0] = true;
+            bits framebuffer(this->backend_, slab.extent, enabled);
+            if (!draw_part(this->uploaded_->bits_draws(), slab, framebuffer, most)) return false;
+            take_bricks(part, framebuffer);
+            return true;
+        });
     }
 
 private:
@@ -58,11 +75,30 @@ private:
     struct twin<vp::framebuffer<Backend, Targets...>> {
         using type = vp::sparse_framebuffer<Backend, Targets...>;
     };
-    using surface = typename twin<typename base::surface_framebuffer>::type;
+    using surface_bricks = typename twin<typename base::surface_framebuffer>::type;
+    using outer_bricks = typename twin<typename base::outer_framebuffer>::type;
     using bits = typename twin<typename base::bits_framebuffer>::type;
+
+    // The bar shows a pass from `begin` to `end` of its work from here on.
+    void report_from(int pass, int passes, double begin, double end) {
+        this->report_ = [=, this](double done) {
+            if (this->request_.progress) this->request_.progress((pass + begin + done * (end - begin)) / passes);
+        };
+    }
+    // The surface as the first passes of so many.
+    [[nodiscard]] sparse_volume surface_in(const voxelpipe::grid& whole, int passes) {
+        sparse_volume result;
+        result.shape = volume_of(whole);
+        this->stats_.slabs = 1;
+        if (this->draws_surface_) draw_slabs(result, passes);
+        if (this->wants(target::color_outer)) draw_outer(result, passes);
+        return result;
+    }
 
     // ---- slabs of the surface --------------------------------------------------------------------------------------
 
+    // Bytes of a voxel while its bit alone is drawn.
+    static constexpr double bit_bytes = 0.375;
     // Bytes of a voxel while a slab is drawn: the targets, once more while they are packed, and the channels.
     [[nodiscard]] double voxel_bytes() const {
         double bytes = 0.25;
@@ -101,38 +137,61 @@ private:
                 }
         return voxels;
     }
-    // As many slabs as keep within the working memory; one that would not is halved, down to a tile's height. Their
-    // borders are borders of bricks.
-    template <class Report>
-    void draw_slabs(sparse_volume& result, const Report& report_from) {
-        const voxelpipe::grid& all = this->uploaded_->relative_grid();
+    // As many slabs as keep within the working memory with so many bytes a voxel; one that would not is halved, down to
+    // a tile's height. Their borders are borders of bricks. draw(slab, most) returns false, without having done
+    // anything, if it has more than `most` voxels. Returns the number of slabs.
+    template <class Draw>
+    int draw_within(double bytes_of_voxel, int pass, int passes, const Draw& draw) {
+        const voxelpipe::grid all = this->uploaded_->relative_grid();
         constexpr double least_work = 64 << 20;
         const double work = this->request_.work_memory != 0
                                 ? static_cast<double>(this->request_.work_memory)
                                 : std::max(least_work, static_cast<double>(memory::room()) / 4);
-        const auto budget = static_cast<std::uint64_t>(work / voxel_bytes());
+        const auto budget = static_cast<std::uint64_t>(work / bytes_of_voxel);
         const double slabs = std::ceil(likely_voxels() / static_cast<double>(budget));
         constexpr int tile = 32;
         const auto whole_tiles = [](double depth) { return std::max(1, static_cast<int>(depth / tile)) * tile; };
         int depth = slabs <= 1 ? all.extent.z + tile : whole_tiles(all.extent.z / slabs);
-        std::vector<sparse_volume> parts;
+        int drawn = 0;
         for (int begin = 0; begin < all.extent.z;) {
             const int border = (all.offset.z + begin) / tile * tile + depth - all.offset.z;
             const int end = std::min(border, all.extent.z);
             const voxelpipe::grid slab = all.crop({0, 0, begin}, {all.extent.x, all.extent.y, end - begin});
-            report_from(0, static_cast<double>(begin) / all.extent.z, static_cast<double>(end) / all.extent.z);
-            sparse_volume part;
-            part.shape = result.shape;
+            report_from(pass, passes, static_cast<double>(begin) / all.extent.z,
+                        static_cast<double>(end) / all.extent.z);
             const bool is_least = end - begin <= tile;
-            const std::uint64_t most = is_least ? std::numeric_limits<std::uint64_t>::max() : budget;
-            if (this->only_bits_ ? draw_bits(part, slab, most) : draw_surface(part, slab, most)) {
-                parts.push_back(std::move(part));
+            if (draw(slab, is_least ? std::numeric_limits<std::uint64_t>::max() : budget)) {
                 begin = end;
+                ++drawn;
             } else {
                 depth = whole_tiles((end - begin) / 2.0);
             }
         }
-        this->stats_.slabs = static_cast<int>(parts.size());
+        return drawn;
+    }
+    // The bricks of the request's part. draw(slab, most, part) as draw_within() has it.
+    template <class Draw>
+    [[nodiscard]] sparse_volume bricks_of(const voxelpipe::grid& whole, const Draw& draw) {
+        std::vector<sparse_volume> parts;
+        draw_within(bit_bytes, 0, 1, [&](const voxelpipe::grid& slab, std::uint64_t most) {
+            sparse_volume part;
+            part.shape = volume_of(whole);
+            if (!draw(slab, most, part)) return false;
+            parts.push_back(std::move(part));
+            return true;
+        });
+        return join_slabs(std::move(parts));
+    }
+    void draw_slabs(sparse_volume& result, int passes) {
+        std::vector<sparse_volume> parts;
+        this->stats_.slabs =
+            draw_within(voxel_bytes(), 0, passes, [&](const voxelpipe::grid& slab, std::uint64_t most) {
+                sparse_volume part;
+                part.shape = result.shape;
+                if (!(this->only_bits_ ? draw_bits(part, slab, most) : draw_surface(part, slab, most))) return false;
+                parts.push_back(std::move(part));
+                return true;
+            });
         const typename base::stage_timer timer{*this, "resolve"};
         result = join_slabs(std::move(parts));
         if (this->draws_lines_) this->stats_.voxels = result.num_voxels(); // a voxel may have been drawn twice
@@ -160,18 +219,24 @@ private:
             if (wanted == target::occupancy) add_occupancy(result);
             if (wanted == target::count && this->counts_fragments())
                 copy<1, std::uint32_t>(result, wanted, framebuffer);
+            if (wanted == target::color_outer) add_unset(result, wanted);
         }
         return true;
+    }
+
+    // False as draw_part().
+    [[nodiscard]] bool draw_surface_in(const voxelpipe::grid& slab, surface_bricks& framebuffer,
+                                       std::bitset<base::num_targets> enabled, std::uint64_t most) {
+        return draw_part(this->uploaded_->draws(), slab, framebuffer, most) &&
+               this->draw_lines(this->uploaded_->line_draws(), slab, framebuffer, enabled);
     }
 
     [[nodiscard]] bool draw_surface(sparse_volume& result, const voxelpipe::grid& slab, std::uint64_t most) {
         auto enabled = this->enabled_targets();
         if (enabled.count() > 1) enabled[base::occupancy] = false;
-        surface framebuffer(this->backend_, slab.extent, enabled);
+        surface_bricks framebuffer(this->backend_, slab.extent, enabled);
         if (enabled[base::triangle]) vp::get<base::triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
-        if (!draw_part(this->uploaded_->draws(), slab, framebuffer, most) ||
-            !this->draw_lines(this->uploaded_->line_draws(), slab, framebuffer, enabled))
-            return false;
+        if (!draw_surface_in(slab, framebuffer, enabled, most)) return false;
         const typename base::stage_timer timer{*this, "resolve"};
         take_bricks(result, framebuffer);
         for (const target wanted : this->request_.targets) {
@@ -195,6 +260,7 @@ private:
                 copy<base::color_last, glm::u8vec4>(result, wanted, framebuffer);
                 break;
             case target::color_outer:
+                add_unset(result, wanted);
                 break;
             case target::normal:
                 resolve<glm::vec3>(result, wanted, unit_normal{values_of<base::normal_sum>(framebuffer)});
@@ -216,11 +282,54 @@ private:
         return true;
     }
 
+    // Fills the channel of color-outer, once all voxels of the request's part are known.
+    void draw_outer(sparse_volume& result, int passes) {
+        const voxelize_stats counted = this->stats_; // the same fragments again
+        const voxelpipe::grid all = this->uploaded_->relative_grid();
+        const auto columns = [](int a, int b) { return static_cast<std::size_t>(a) * static_cast<std::size_t>(b); };
+        column_table along_z{all.offset, all.extent, {}};
+        if (this->request_.columns == nullptr) {
+            const typename base::stage_timer timer{*this, "outside"};
+            along_z.along[2].resize(columns(all.extent.x, all.extent.y));
+            add_columns(result, along_z);
+        }
+        this->make_outer_draws();
+        channel& colors = *std::find_if(result.channels.begin(), result.channels.end(),
+                                        [](const channel& c) { return c.name == info_of(target::color_outer).name; });
+        draw_within(2 * sizeof(std::uint64_t) + sizeof(glm::u8vec4), 1, passes,
+                    [&](const voxelpipe::grid& slab, std::uint64_t most) {
+                        column_table ends{slab.offset, slab.extent, {}};
+                        ends.along[0].resize(columns(slab.extent.y, slab.extent.z));
+                        ends.along[1].resize(columns(slab.extent.x, slab.extent.z));
+                        {
+                            const typename base::stage_timer timer{*this, "outside"};
+                            add_columns(result, ends);
+                        }
+                        column_view view = ends.view();
+                        view.along[2] =
+                            this->request_.columns != nullptr ? this->request_.columns : along_z.along[2].data();
+                        this->set_columns(view);
+                        std::bitset<1> enabled;
+                        enabled.set();
+                        outer_bricks framebuffer(this->backend_, slab.extent, enabled);
+                        if (!draw_part(this->outer_draws_, slab, framebuffer, most) ||
+                            !this->draw_lines(this->outer_line_draws_, slab, framebuffer, enabled))
+                            return false;
+                        const typename base::stage_timer timer{*this, "resolve"};
+                        sparse_volume part;
+                        take_bricks(part, framebuffer);
+                        resolve<glm::u8vec4>(part, target::color_outer, outer_color{values_of<0>(framebuffer)});
+                        put_values(part, part.channels.front(), result, colors);
+                        return true;
+                    });
+        this->restore_counts(counted);
+    }
+
     // The solid's bricks and tiles, and the values of the surface where that lies in them: in bricks.
     [[nodiscard]] sparse_volume draw_solid(sparse_volume&& surface_of) {
         // The outside follows from the whole grid: a flood is drawn there, with the padding, or has been before.
         const bool is_flood = this->request_.solid->rule == solid_rule::exterior;
-        const voxelpipe::grid& wanted_part = this->uploaded_->relative_grid();
+        const voxelpipe::grid wanted_part = this->uploaded_->relative_grid();
         const voxelpipe::grid part =
             is_flood && this->request_.solid->slab == nullptr ? wanted_part.uncropped() : wanted_part;
         std::bitset<2> enabled;
@@ -272,6 +381,10 @@ private:
     template <std::size_t I, class Framebuffer>
     [[nodiscard]] static const auto* values_of(const Framebuffer& framebuffer) {
         return get<I>(framebuffer.contents().values).data();
+    }
+    // A channel whose values come later.
+    void add_unset(sparse_volume& result, target id) {
+        resolve<glm::u8vec4>(result, id, [](std::size_t) { return glm::u8vec4(0); });
     }
     static void add_occupancy(sparse_volume& result) { result.channels.push_back({"occupancy", scalar::bit, 1, {}}); }
 

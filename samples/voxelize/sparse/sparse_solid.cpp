@@ -18,17 +18,22 @@ using rgba8 = color_mean::rgba8;
 
 rgba8 fill_color_of(const channel& colors, const solid_request& request) {
     if (request.fill_color) return {(*request.fill_color)[0], (*request.fill_color)[1], (*request.fill_color)[2], 255};
+    if (request.means != nullptr) return (*request.means)[static_cast<std::size_t>(*target_named(colors.name))];
     const color_mean mean;
     color_mean::sums sums{};
-    for (std::size_t at = 0; at < colors.data.size(); at += 4) {
-        rgba8 color;
-        std::memcpy(color.data(), colors.data.data() + at, 4);
-        mean.add(sums, color);
-    }
+    add_colors(sums, mean, colors);
     return mean.mean_of(sums);
 }
 
 } // namespace
+
+void add_colors(color_mean::sums& to, const color_mean& mean, const channel& colors) {
+    for (std::size_t at = 0; at < colors.data.size(); at += 4) {
+        rgba8 color;
+        std::memcpy(color.data(), colors.data.data() + at, 4);
+        mean.add(to, color);
+    }
+}
 
 void keep_part(sparse_volume& v, const glm::ivec3& offset, const glm::ivec3& extent) {
     if (!v.tiles.empty()) v = open_tiles(v); // some may reach out of the box

@@ -5,12 +5,12 @@
 #include "../formats/output_file.hpp"
 #include "../memory.hpp"
 #include "../parallel.hpp"
+#include "loaded_slabs.hpp"
 #include "sparse_formats.hpp"
 #include "sparse_pipeline.hpp"
 #include "streamed_model.hpp"
 
 #include <cpu_ref/backend.hpp>
-#include <voxelpipe/slabs/exterior.hpp>
 
 #include <algorithm>
 #include <new>
@@ -33,7 +33,6 @@ storage_decision choose_storage(storage_choice choice, const voxelize_request& r
     const bool insists = choice == storage_choice::sparse;
     if (!insists && !needs_bricks && fits) return {};
     const char* refused = nullptr;
-    if (request.wants(target::color_outer)) refused = "--target color-outer needs a dense grid";
     if (request.backend == backend_choice::cuda)
         refused = "the tool draws sparse grids on the CPU, not with --backend cuda";
     if (refused != nullptr) {
@@ -45,17 +44,63 @@ storage_decision choose_storage(storage_choice choice, const voxelize_request& r
                                : "a dense one would take " + memory::mebibytes(dense)};
 }
 
-sparse_volume draw_sparse(scene& model, const voxelize_request& inside, const voxelpipe::grid& whole,
-                          voxelize_stats& stats) {
-    vp::cpu_backend backend{static_cast<unsigned>(thread_count(inside.threads))};
+// The pipeline reads the request and writes the counts where they lie.
+struct sparse_drawer::state {
+    state(scene& model, const voxelize_request& of_model)
+        : request(of_model),
+          whole(of_model.grid.uncropped()), backend{static_cast<unsigned>(thread_count(of_model.threads))} {
+        backend.times = &times;
+        stats.backend = "cpu";
+        stats.threads = thread_count(of_model.threads);
+        pipeline.emplace(backend, model, request, stats);
+        of_all = stats;
+    }
+
+    voxelize_request request;
+    voxelpipe::grid whole;
+    voxelize_stats stats, of_all; // of_all: before anything is drawn
     vp::stage_times times;
-    backend.times = &times;
-    stats.backend = "cpu";
-    stats.threads = thread_count(inside.threads);
-    sparse_volume result = sparse_pipeline<vp::cpu_backend>{backend, model, inside, stats}.run(whole);
+    vp::cpu_backend backend;
+    std::optional<sparse_pipeline<vp::cpu_backend>> pipeline;
+};
+
+sparse_drawer::sparse_drawer(scene&& model, const voxelize_request& request)
+    : state_(std::make_unique<state>(model, request)) {}
+sparse_drawer::~sparse_drawer() = default;
+
+const std::vector<std::string>& sparse_drawer::warnings() const { return state_->of_all.warnings; }
+
+sparse_volume sparse_drawer::draw(const voxelize_request& part, voxelize_stats& stats) {
+    state_->request = part;
+    state_->times = {};
+    std::vector<std::pair<std::string, double>> times = std::move(stats.milliseconds);
+    state_->stats = state_->of_all;
+    state_->of_all.milliseconds.clear(); // the model is uploaded once
+    sparse_volume result = state_->pipeline->run(state_->whole);
     constexpr std::string_view absent[] = {"tile_split", "abuffer_emit", "clear"};
-    show_stages(stats, times, absent, "");
+    show_stages(state_->stats, state_->times, absent, "");
+    stats = std::move(state_->stats);
+    stats.milliseconds.insert(stats.milliseconds.begin(), times.begin(), times.end());
     return result;
+}
+sparse_volume sparse_drawer::surface(const voxelize_request& part) {
+    state_->request = part;
+    return state_->pipeline->surface(state_->whole);
+}
+sparse_volume sparse_drawer::occupied(const voxelize_request& part) {
+    state_->request = part;
+    return state_->pipeline->occupied(state_->whole);
+}
+sparse_volume sparse_drawer::walls(const voxelize_request& part) {
+    state_->request = part;
+    return state_->pipeline->walls(state_->whole);
+}
+
+sparse_volume empty_bricks(const voxelize_request& request) {
+    voxelize_request inside = request;
+    inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
+    voxelize_stats none;
+    return sparse_drawer(scene{}, request).draw(inside, none);
 }
 
 sparse_volume draw_walls(scene&& model, const voxelize_request& request, const slabs::layer_range& layers) {
@@ -70,77 +115,29 @@ sparse_volume draw_walls(scene&& model, const voxelize_request& request, const s
         p.lines = {};
     }
     voxelize_request how = request;
-    how.solid.reset();
     how.targets = {target::occupancy};
-    how.coverage = voxelpipe::coverage::conservative;
     const glm::ivec3 extent = request.grid.extent;
     how.grid = request.grid.crop({0, 0, layers.begin}, {extent.x, extent.y, layers.size()});
-    voxelize_stats none;
-    return draw_sparse(plain, how, request.grid, none);
+    return sparse_drawer(std::move(plain), request).walls(how);
 }
+
+double decided_layer_bytes(const glm::ivec3& extent) { return static_cast<double>(extent.x) * extent.y; }
 
 namespace {
 
-// Bytes of a layer of a flood or a vote, about: dense bits several times, and once more as words with their places.
-double layer_bytes(const voxelize_request& request) {
-    return static_cast<double>(request.grid.extent.x) * request.grid.extent.y;
-}
-
 // A flood or a vote in as many slabs as their bits need.
-sparse_volume draw_in_slabs(const scene& model, const voxelize_request& request, const std::filesystem::path& folder,
+sparse_volume draw_in_slabs(scene&& model, const voxelize_request& request, const std::filesystem::path& folder,
                             voxelize_stats& stats) {
     constexpr int brick = 8;
-    const voxelpipe::grid& whole = request.grid;
-    const int padding = request.padding;
-    const auto room = static_cast<double>(memory::room());
-    const int depth = std::max(1, static_cast<int>(room / 4 / layer_bytes(request)) / brick) * brick;
-    const bool floods = request.solid->rule == solid_rule::exterior;
-    const int first_layer = padding, last_layer = whole.extent.z - padding;
-    std::optional<vp::slabs::slab_exterior> exterior;
-    double done = 0;
-    const double share_of_walls = floods ? 0.3 : 0;
-    const auto report = [&](voxelize_request& part, double share) {
-        if (request.progress) part.progress = [&request, done, share](double d) { request.progress(done + d * share); };
-        done += share;
-    };
-    if (floods) {
-        memory::require(vp::slabs::slab_exterior::least_bytes(whole.extent, request.solid->closing),
-                        "the flood of --solid exterior");
-        exterior.emplace(whole.extent, request.solid->closing, static_cast<std::uint64_t>(room / 8), folder.string(),
-                         static_cast<unsigned>(thread_count(request.threads)));
-        voxelize_request walls = request;
-        report(walls, share_of_walls);
-        exterior->add_walls(draw_walls(scene(model), walls, {0, whole.extent.z}).table());
-        exterior->flood();
-    }
+    const int layers = request.grid.extent.z;
+    const double fits = static_cast<double>(memory::room()) / 4 / decided_layer_bytes(request.grid.extent);
+    const int depth = std::max(1, static_cast<int>(fits) / brick) * brick;
+    std::vector<slabs::layer_range> all;
+    for (int begin = 0; begin < layers; begin += depth) all.push_back({begin, std::min(layers, begin + depth)});
+    loaded_slabs of_model(std::move(model), request, all, all.size(), folder);
     std::vector<sparse_volume> parts;
-    for (int begin = first_layer; begin < last_layer;) {
-        const int end = std::min(last_layer, (begin / brick) * brick + depth);
-        voxelize_request part = request;
-        part.grid = whole.crop({padding, padding, begin},
-                               {whole.extent.x - 2 * padding, whole.extent.y - 2 * padding, end - begin});
-        report(part, (1 - share_of_walls) * (end - begin) / (last_layer - first_layer));
-        std::optional<vp::core::bit_grid> inside;
-        vp::solid_slab decided;
-        if (floods) {
-            inside = exterior->inside(part.grid.offset, part.grid.extent);
-            decided.inside = inside->data();
-            part.solid->slab = &decided;
-        }
-        scene copy = model; // drawing takes its arrays
-        voxelize_stats of_part;
-        parts.push_back(draw_sparse(copy, part, whole, of_part));
-        // The first line is about the model's lines, if there is one; others are about the part alone.
-        if (parts.size() == 1 && model.line_count() != 0 && !of_part.warnings.empty())
-            stats.warnings.push_back(of_part.warnings.front());
-        add_part(stats, of_part);
-        stats.backend = of_part.backend;
-        stats.threads = of_part.threads;
-        stats.triangles = of_part.triangles;
-        stats.triangles_dropped = of_part.triangles_dropped;
-        ++stats.slabs;
-        begin = end;
-    }
+    parts.reserve(all.size());
+    for (const slabs::layer_range& part : all) parts.push_back(of_model.draw(part, stats));
     warn_of_parts(stats, request);
     if (std::string text = flood_warning(*request.solid, *stats.solid, stats.voxels); !text.empty())
         stats.warnings.push_back(std::move(text));
@@ -154,10 +151,12 @@ sparse_volume run_sparse_voxelizer(scene&& model, const voxelize_request& reques
     voxelize_request inside = request;
     inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
     const bool needs_bits = request.solid && (request.solid->vote || request.solid->rule == solid_rule::exterior);
-    const bool bits_fit = layer_bytes(request) * request.grid.extent.z <= static_cast<double>(memory::room());
+    const bool bits_fit =
+        decided_layer_bytes(request.grid.extent) * request.grid.extent.z <= static_cast<double>(memory::room());
     try {
-        if (needs_bits && !bits_fit && model.triangle_count() != 0) return draw_in_slabs(model, request, folder, stats);
-        return draw_sparse(model, inside, request.grid, stats);
+        if (needs_bits && !bits_fit && model.triangle_count() != 0)
+            return draw_in_slabs(std::move(model), request, folder, stats);
+        return sparse_drawer(std::move(model), request).draw(inside, stats);
     } catch (const std::system_error& error) {
         throw write_error(folder, "temporary files for a flood: " + error.code().message());
     } catch (const std::bad_alloc&) {

@@ -10,6 +10,7 @@
 #include "streamed_holes.hpp"
 #include "streamed_repairs.hpp"
 #include "streamed_slab.hpp"
+#include "whole_colors.hpp"
 
 #include <voxelpipe/slabs/bins.hpp>
 #include <voxelpipe/slabs/plan.hpp>
@@ -31,10 +32,7 @@ opened_stream streamed_input(const command_line& options, const std::filesystem:
     const bool is_drawn_here = request.backend != backend_choice::cuda &&
                                request.strategy == voxelpipe::strategy::automatic &&
                                options.storage != storage_choice::dense;
-    // Both see the whole grid at once.
-    const bool sees_whole_grid =
-        request.wants(target::color_outer) || (request.solid && !request.solid->fill_color && request.wants_colors());
-    if (!is_drawn_here || sees_whole_grid) return {};
+    if (!is_drawn_here) return {};
     return open_stream(options.input, {memory::room() / 8, loaded_room}, folder, options.load);
 }
 
@@ -97,6 +95,11 @@ std::vector<streamed_slab<Varyings>> slabs_within(const slabs::plan& plan, std::
     return parts;
 }
 
+void add_time(voxelize_stats& stats, const char* stage, std::chrono::steady_clock::time_point since) {
+    const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - since;
+    stats.milliseconds.emplace_back(stage, time.count());
+}
+
 // The triangles of each slab.
 template <class Varyings>
 void bin_triangles(triangle_stream& model, const corner_placer& classify, const stream_place& place, double room,
@@ -149,11 +152,13 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
         }
     });
     streamed_repairs repairs(model, request, room, place.folder);
+    whole_colors colors(request);
+    const int passes = (repairs.floods() ? 1 : 0) + colors.num_passes(); // over all slabs, before the first is drawn
     slabs::plan_options how;
     how.align = brick;
     how.layer_cost = static_cast<std::uint64_t>(repairs.layer_bytes() / draw_bytes<Varyings>);
     const auto most = static_cast<std::uint64_t>(std::max(1.0, room / 4 / draw_bytes<Varyings>));
-    auto parts = slabs_within<Varyings>(slabs::cover(layers, 2, most, how), ranges, repairs.floods());
+    auto parts = slabs_within<Varyings>(slabs::cover(layers, 2, most, how), ranges, passes != 0);
     place.say(std::to_string(model.num_triangles()) + " triangles do not fit into " + memory::mebibytes(room) +
               ": they are drawn in " + std::to_string(parts.size()) + " slabs, through temporary files in " +
               place.folder.string());
@@ -169,8 +174,7 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
         for (const auto& part : parts) drawn.push_back(drawn_layers(part.layers));
         repairs.begin(drawn);
         bin_triangles(model, classify, place, room, whole.extent.z, repairs, parts);
-        const std::chrono::duration<double, std::milli> binning = std::chrono::steady_clock::now() - start;
-        stats.milliseconds.emplace_back("bin", binning.count());
+        add_time(stats, "bin", start);
         stats.triangles_dropped = counts.triangles_dropped();
         stats.triangles_flat = counts.triangles_zero_area;
 
@@ -179,28 +183,45 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
         const auto num_drawn = std::count_if(parts.begin(), parts.end(), [](const auto& part) {
             return part.range != streamed_slab<Varyings>::no_range;
         });
-        const double all =
-            static_cast<double>(parts.size()) * (repairs.floods() ? 1 : 0) + static_cast<double>(num_drawn);
+        const double all = static_cast<double>(parts.size()) * passes + static_cast<double>(num_drawn);
         double done = 0; // of `all`
         const auto report_part = [&](voxelize_request& part) {
             if (request.progress) part.progress = [&, done](double share) { request.progress((done + share) / all); };
             ++done;
         };
+        // The slab without the padding.
+        const auto request_of = [&](const slabs::layer_range& layers) {
+            const auto [begin, end] = drawn_layers(layers);
+            voxelize_request part = request;
+            part.grid = whole.crop({padding, padding, begin},
+                                   {whole.extent.x - 2 * padding, whole.extent.y - 2 * padding, end - begin});
+            part.work_memory = request.work_memory != 0 ? request.work_memory : static_cast<std::uint64_t>(room / 8);
+            report_part(part);
+            return part;
+        };
         if (repairs.floods()) {
             const auto begin = std::chrono::steady_clock::now();
-            for (auto& part : parts) {
+            for (const auto& part : parts)
                 if (part.triangles.size() != 0) {
                     voxelize_request walls;
                     report_part(walls);
                     repairs.add_walls(scene_of(part, model), part.layers, walls.progress);
                 }
-                if (part.range == streamed_slab<Varyings>::no_range) part.triangles = {};
-            }
-            std::erase_if(parts, [](const auto& part) { return part.range == streamed_slab<Varyings>::no_range; });
             repairs.flood();
-            const std::chrono::duration<double, std::milli> flooding = std::chrono::steady_clock::now() - begin;
-            stats.milliseconds.emplace_back("flood", flooding.count());
+            add_time(stats, "flood", begin);
         }
+        if (colors.num_passes() != 0) {
+            const auto begin = std::chrono::steady_clock::now();
+            for (int pass = 0; pass < colors.num_passes(); ++pass)
+                for (const auto& part : parts)
+                    if (part.triangles.size() != 0 && drawn_layers(part.layers).size() > 0) {
+                        const voxelize_request slab = request_of(part.layers);
+                        sparse_drawer of_slab(scene_of(part, model), slab);
+                        colors.add(pass, of_slab, slab);
+                    }
+            add_time(stats, "colors", begin);
+        }
+        std::erase_if(parts, [](const auto& part) { return part.range == streamed_slab<Varyings>::no_range; });
         for (std::size_t r = 0, s = 0; r < ranges.size(); ++r) {
             std::vector<sparse_volume> of_range;
             for (; s < parts.size() && parts[s].range == r; ++s) {
@@ -219,29 +240,19 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
                             static_cast<std::uint64_t>(whole.extent.y - 2 * padding);
                     continue;
                 }
-                voxelize_request part = request;
-                part.grid = whole.crop({padding, padding, begin},
-                                       {whole.extent.x - 2 * padding, whole.extent.y - 2 * padding, end - begin});
-                part.work_memory =
-                    request.work_memory != 0 ? request.work_memory : static_cast<std::uint64_t>(room / 8);
-                report_part(part);
+                voxelize_request part = request_of(parts[s].layers);
+                colors.give_to(part);
                 const vp::solid_slab decided = repairs.of(part.grid);
                 if (repairs.is_any()) part.solid->slab = &decided;
                 const std::vector<vp::core::hole_cones> cones = holes.of_bodies(numbers);
                 if (!cones.empty()) part.solid->cones = cones.data();
                 voxelize_stats of_part;
-                of_range.push_back(draw_sparse(of_slab, part, whole, of_part));
+                of_range.push_back(sparse_drawer(std::move(of_slab), part).draw(part, of_part));
                 holes.count(of_part);
                 add_part(stats, of_part);
                 ++stats.slabs;
             }
-            if (of_range.empty()) { // the whole grid without a triangle
-                scene nothing;
-                voxelize_stats none;
-                voxelize_request inside = request;
-                inside.grid = whole.crop(glm::ivec3(padding), whole.extent - 2 * padding);
-                of_range.push_back(draw_sparse(nothing, inside, whole, none));
-            }
+            if (of_range.empty()) of_range.push_back(empty_bricks(request)); // no triangle is there
             sink(r, of_range.size() == 1 ? std::move(of_range[0]) : join_slabs(std::move(of_range)));
         }
         holes.count(stats);

@@ -23,8 +23,7 @@
 namespace voxelize {
 
 // The command's input as a stream, where it has to be one: a file that open_stream() knows and that takes more bytes
-// than LOADED_ROOM when it is loaded, for all targets but color-outer and for all solids, on the CPU. folder: for
-// temporary files. Throws as open_stream() does.
+// than LOADED_ROOM when it is loaded, on the CPU. folder: for temporary files. Throws as open_stream() does.
 [[nodiscard]] opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder,
                                            double loaded_room);
 

@@ -30,11 +30,7 @@ streamed_repairs::streamed_repairs(const triangle_stream& model, const voxelize_
                       static_cast<unsigned>(thread_count(request.threads)));
 }
 
-double streamed_repairs::layer_bytes() const {
-    // Parities along three axes and the cover, or the flood's window; the slab's bits once more as words with their
-    // places, four times as large.
-    return is_any() ? static_cast<double>(inner_.extent.x) * inner_.extent.y : 0;
-}
+double streamed_repairs::layer_bytes() const { return is_any() ? decided_layer_bytes(inner_.extent) : 0; }
 
 void streamed_repairs::begin(std::span<const slabs::layer_range> drawn) {
     if (!votes_) return;
