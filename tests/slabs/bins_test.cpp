@@ -48,8 +48,7 @@ struct filled {
         slabs::bin_memory<record_type> memory(400'000, bins.size(), ::testing::TempDir());
         slabs::detail::chunk_router<record_type> router(threads, 64 << 20);
         const mesh_type chunk = m.with_colors();
-        const slabs::chunk_records<varyings, mesh_type> records(chunk, moved{}, grid, vp::coverage::conservative, false,
-                                                                7, threads);
+        const slabs::chunk_records<varyings, mesh_type> records(chunk, moved{}, grid, {}, 7, threads);
         status = router.route(records, chunk.triangles.size(), table, bins, memory, counts);
         for (const auto& b : bins) in_files += b.in_file();
     }

@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// repair::vote for a mesh that is drawn in slabs along z: rows along x and y lie within a slab, those along z do not.
-// One pass over all triangles finds for every slab the parity of each column below it, and whether the whole column is
-// open; solid_options::slab brings both to the slab's call. Plain C++.
+// repair::vote for a mesh that is drawn in slabs along z: rows along x and y lie within a slab, those along z do not. A
+// slab's call takes the parity of each column below it, and whether the whole column is open (solid_options::slab).
+// Plain C++.
+//
+//   column_parities   slabs that are known before the triangles come, gaps between them allowed: a layer of bits a slab
+//   column_sweep      slabs that follow each other, wherever they turn out to begin: three layers of bits
 
 #include <voxelpipe/core/crossing.hpp>
 #include <voxelpipe/grid.hpp>
@@ -14,21 +17,57 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
 namespace voxelpipe::slabs {
+
+namespace detail {
+
+// The columns of a grid along z, and where triangles cross them.
+class crossed_columns {
+public:
+    explicit crossed_columns(const grid& g)
+        : extent_(g.extent), fraction_(core::make_snap_transform(g).fraction),
+          words_((static_cast<std::size_t>(extent_.x) + 63) / 64) {}
+
+    [[nodiscard]] int layers() const { return extent_.z; }
+    // Words of a layer: 64 columns each, in rows along x.
+    [[nodiscard]] std::size_t words() const { return words_ * static_cast<std::size_t>(extent_.y); }
+
+    // Calls visit(word, bit, above) for each column that a triangle crosses. A slab that begins at layer `above` or
+    // higher has the crossing below it; one that begins lower flips the column itself, if it gets the triangle.
+    template <class Visit>
+    void for_each(const core::snapped_position& a, const core::snapped_position& b, const core::snapped_position& c,
+                  const Visit& visit) const {
+        if (!core::is_drawable(a) || !core::is_drawable(b) || !core::is_drawable(c)) return;
+        const core::voxel_box whole{{{0, 0, 0}}, {{extent_.x - 1, extent_.y - 1, extent_.z - 1}}};
+        const core::row_box columns = core::rows_within<2>(a, b, c, fraction_, whole);
+        const std::int64_t top = core::bounds(a, b, c, fraction_).hi[2];
+        core::for_each_crossing<2, core::centre_offset<>>(
+            a, b, c, fraction_, columns, [&](std::int64_t x, std::int64_t y, std::int64_t first, int) {
+                visit(static_cast<std::size_t>(y) * words_ + static_cast<std::size_t>(x) / 64,
+                      std::uint64_t{1} << (x % 64), first + (top < first ? 0 : 1));
+            });
+    }
+
+private:
+    glm::ivec3 extent_;
+    int fraction_;
+    std::size_t words_; // in a row
+};
+
+} // namespace detail
 
 // A bit for each column of a grid, and of each slab: a slice of bits a slab.
 class column_parities {
 public:
     // slabs: layers of the grid's computed part, not empty, ascending, without overlaps; there may be gaps.
     column_parities(const grid& g, std::vector<layer_range> slabs)
-        : extent_(g.extent), fraction_(core::make_snap_transform(g).fraction), slabs_(std::move(slabs)),
-          words_((static_cast<std::size_t>(extent_.x) + 63) / 64), below_(slabs_.size()),
-          open_(words_ * static_cast<std::size_t>(extent_.y)) {
+        : columns_(g), slabs_(std::move(slabs)), below_(slabs_.size()), open_(columns_.words()) {
         for (std::vector<std::uint64_t>& slice : below_) slice.resize(open_.size());
-        first_slab_.assign(static_cast<std::size_t>(extent_.z) + 1, slabs_.size());
+        first_slab_.assign(static_cast<std::size_t>(columns_.layers()) + 1, slabs_.size());
         for (std::size_t s = slabs_.size(); s-- > 0;)
             std::fill_n(first_slab_.begin(), static_cast<std::size_t>(slabs_[s].begin) + 1, s);
     }
@@ -40,21 +79,12 @@ public:
 
     // A triangle, snapped in the grid; each of the mesh once, wherever it lies. One that cannot be drawn is left out.
     void add(const core::snapped_position& a, const core::snapped_position& b, const core::snapped_position& c) {
-        if (!core::is_drawable(a) || !core::is_drawable(b) || !core::is_drawable(c)) return;
-        const core::voxel_box whole{{{0, 0, 0}}, {{extent_.x - 1, extent_.y - 1, extent_.z - 1}}};
-        const core::row_box columns = core::rows_within<2>(a, b, c, fraction_, whole);
-        const std::int64_t top = core::bounds(a, b, c, fraction_).hi[2];
-        core::for_each_crossing<2, core::centre_offset<>>(
-            a, b, c, fraction_, columns, [&](std::int64_t x, std::int64_t y, std::int64_t first, int) {
-                const std::size_t word = static_cast<std::size_t>(y) * words_ + static_cast<std::size_t>(x) / 64;
-                const std::uint64_t bit = std::uint64_t{1} << (x % 64);
-                open_[word] ^= bit;
-                // A slab that begins at `first` flips it itself if it gets the triangle.
-                const std::int64_t above = first + (top < first ? 0 : 1);
-                const std::size_t s =
-                    first_slab_[static_cast<std::size_t>(std::clamp<std::int64_t>(above, 0, extent_.z))];
-                if (s < slabs_.size()) below_[s][word] ^= bit;
-            });
+        columns_.for_each(a, b, c, [&](std::size_t word, std::uint64_t bit, std::int64_t above) {
+            open_[word] ^= bit;
+            const std::size_t s =
+                first_slab_[static_cast<std::size_t>(std::clamp<std::int64_t>(above, 0, columns_.layers()))];
+            if (s < slabs_.size()) below_[s][word] ^= bit;
+        });
     }
 
     // What a slab's call takes, once all triangles are there. By ascending slabs; memory of those before is freed, and
@@ -71,15 +101,62 @@ public:
     }
 
 private:
-    glm::ivec3 extent_;
-    int fraction_;
+    detail::crossed_columns columns_;
     std::vector<layer_range> slabs_;
-    std::size_t words_; // of 64 columns, in a row
     // Crossings between the beginnings of a slab and of the one before; those of all slabs before, from of() on.
     std::vector<std::vector<std::uint64_t>> below_;
     std::vector<std::uint64_t> open_;
     std::vector<std::size_t> first_slab_; // that begins at a layer or above it
     std::size_t at_ = 0;
+};
+
+// The columns of a grid's slabs one after the other, without gaps from the grid's lowest layer on. Each slab's own
+// triangles tell what lies below the next one.
+class column_sweep {
+public:
+    explicit column_sweep(const grid& g)
+        : columns_(g), open_(columns_.words()), below_(columns_.words()), next_(columns_.words()) {}
+    // Bytes that the bits of a grid take.
+    [[nodiscard]] static double bytes(const grid& g) {
+        return 3 * 8 * static_cast<double>(detail::crossed_columns(g).words());
+    }
+
+    // A triangle, snapped in the grid; each of the mesh once, wherever it lies. One that cannot be drawn is left out.
+    void add(const core::snapped_position& a, const core::snapped_position& b, const core::snapped_position& c) {
+        columns_.for_each(a, b, c, [&](std::size_t word, std::uint64_t bit, std::int64_t above) {
+            open_[word] ^= bit;
+            if (above <= 0) below_[word] ^= bit;
+        });
+    }
+
+    // Once all triangles are there: the next slab. All triangles that reach its layers follow.
+    void begin(const layer_range& slab) {
+        slab_ = slab;
+        next_ = below_;
+    }
+    void pass(const core::snapped_position& a, const core::snapped_position& b, const core::snapped_position& c) {
+        columns_.for_each(a, b, c, [&](std::size_t word, std::uint64_t bit, std::int64_t above) {
+            if (above > slab_.begin && above <= slab_.end) next_[word] ^= bit;
+        });
+    }
+    // What the slab's call takes, valid until end().
+    [[nodiscard]] solid_slab bits() const {
+        solid_slab s;
+        s.below = below_.data();
+        s.open = open_.data();
+        return s;
+    }
+    // Goes on to the layers behind the slab. Without this, begin() takes another slab with the same first layer.
+    void end() { below_.swap(next_); }
+
+    // Both layers of bits, for sums over several sweeps of one grid, to each of which some of the triangles were added.
+    [[nodiscard]] std::span<std::uint64_t> open() { return open_; }
+    [[nodiscard]] std::span<std::uint64_t> below() { return below_; }
+
+private:
+    detail::crossed_columns columns_;
+    std::vector<std::uint64_t> open_, below_, next_; // next_: below the layers behind the slab
+    layer_range slab_;
 };
 
 } // namespace voxelpipe::slabs

@@ -23,8 +23,18 @@ namespace voxelpipe::slabs {
 // The holes of one body. Members throw std::bad_alloc, and std::system_error of files.
 class hole_finder {
 public:
-    // num_triangles: that come, about. budget: bytes that may be held beside the edges of the holes. folder: for
-    // temporary files.
+    // The directed edges between two positions.
+    struct edge {
+        core::snapped_position low, high; // ordered by x, then y, then z
+        std::int64_t sum;                 // edges from low to high minus edges from high to low
+    };
+
+    // What edges are ordered by.
+    [[nodiscard]] static auto place(const core::snapped_position& p) { return std::tie(p.x, p.y, p.z); }
+    [[nodiscard]] static auto place(const edge& e) { return std::tuple_cat(place(e.low), place(e.high)); }
+
+    // num_triangles: that come, about; 0: not known. budget: bytes that may be held beside the edges of the holes.
+    // folder: for temporary files.
     hole_finder(std::uint64_t num_triangles, std::uint64_t budget, std::string folder)
         : bins_(bins_for(num_triangles, budget)), memory_(budget / 2, bins_.size(), std::move(folder)),
           block_(static_cast<std::size_t>(std::clamp<std::uint64_t>(budget / 8 / sizeof(edge), 64, 65536))) {}
@@ -38,13 +48,10 @@ public:
         if (fresh_.size() >= block_) sort_out();
     }
 
-    // The cones of all triangles that came, for solid_options::cones: those of core::close_holes. Throws
-    // std::length_error, too, as that does. Nothing is added later.
-    [[nodiscard]] core::hole_cones finish(std::uint64_t max_hole_edges) {
+    // The edges that are left of all triangles that came, each once. Nothing is added later.
+    [[nodiscard]] std::vector<edge> take_edges() {
         sort_out();
-        std::vector<core::edge_chain::edge> boundary;
-        std::vector<core::snapped_position> ends; // two an edge
-        std::vector<edge> of_bin;
+        std::vector<edge> left, of_bin;
         for (bin<edge>& b : bins_) {
             of_bin.clear();
             of_bin.reserve(static_cast<std::size_t>(b.size()));
@@ -52,38 +59,15 @@ public:
                 [&](std::span<const edge> block) { of_bin.insert(of_bin.end(), block.begin(), block.end()); });
             b = {};
             cancel(of_bin);
-            for (const edge& e : of_bin) {
-                const std::uint64_t low = ends.size(), high = low + 1;
-                ends.insert(ends.end(), {e.low, e.high});
-                for (std::int64_t i = e.sum; i > 0; --i) boundary.push_back({low, high});
-                for (std::int64_t i = e.sum; i < 0; ++i) boundary.push_back({high, low});
-            }
+            left.insert(left.end(), of_bin.begin(), of_bin.end());
         }
-        of_bin = {};
-        return core::close_boundary(
-            boundary, [&](std::uint64_t v) { return ends[static_cast<std::size_t>(v)]; }, max_hole_edges);
+        return left;
     }
+    // The cones of all triangles that came, for solid_options::cones: those of core::close_holes. Throws
+    // std::length_error, too, as that does. Nothing is added later.
+    [[nodiscard]] core::hole_cones finish(std::uint64_t max_hole_edges) { return close(take_edges(), max_hole_edges); }
 
-private:
-    // The directed edges between two positions.
-    struct edge {
-        core::snapped_position low, high; // in the order of place()
-        std::int64_t sum;                 // edges from low to high minus edges from high to low
-    };
-    [[nodiscard]] static auto place(const core::snapped_position& p) { return std::tie(p.x, p.y, p.z); }
-    [[nodiscard]] static auto place(const edge& e) { return std::tuple_cat(place(e.low), place(e.high)); }
-
-    // Bins that fit a quarter of the budget each, if no edge cancels before.
-    [[nodiscard]] static std::size_t bins_for(std::uint64_t num_triangles, std::uint64_t budget) {
-        constexpr std::uint64_t most = 1024;
-        return static_cast<std::size_t>(std::clamp<std::uint64_t>(
-            1 + 12 * num_triangles * sizeof(edge) / std::max<std::uint64_t>(budget, 1), 1, most));
-    }
-    void add_edge(const core::snapped_position& from, const core::snapped_position& to) {
-        if (place(from) < place(to)) fresh_.push_back({from, to, 1});
-        if (place(to) < place(from)) fresh_.push_back({to, from, -1});
-    }
-    // Equal edges become one, and those whose sum is 0 none.
+    // Equal edges become one, and those whose sum is 0 none: edges of several finders may be joined.
     static void cancel(std::vector<edge>& edges) {
         std::sort(edges.begin(), edges.end(), [](const edge& a, const edge& b) { return place(a) < place(b); });
         std::size_t kept = 0;
@@ -93,6 +77,33 @@ private:
             if (all.sum != 0) edges[kept++] = all;
         }
         edges.resize(kept);
+    }
+    // The cones over edges that are left, each of which is there once.
+    [[nodiscard]] static core::hole_cones close(const std::vector<edge>& left, std::uint64_t max_hole_edges) {
+        std::vector<core::edge_chain::edge> boundary;
+        for (std::size_t i = 0; i < left.size(); ++i) {
+            const std::uint64_t low = 2 * i, high = low + 1;
+            for (std::int64_t n = left[i].sum; n > 0; --n) boundary.push_back({low, high});
+            for (std::int64_t n = left[i].sum; n < 0; ++n) boundary.push_back({high, low});
+        }
+        const auto position = [&](std::uint64_t v) {
+            const edge& e = left[static_cast<std::size_t>(v / 2)];
+            return v % 2 == 0 ? e.low : e.high;
+        };
+        return core::close_boundary(boundary, position, max_hole_edges);
+    }
+
+private:
+    // Bins that fit a quarter of the budget each, if no edge cancels before. Each may have an open file.
+    [[nodiscard]] static std::size_t bins_for(std::uint64_t num_triangles, std::uint64_t budget) {
+        constexpr std::uint64_t most = 1024;
+        if (num_triangles == 0) return static_cast<std::size_t>(std::clamp<std::uint64_t>(budget >> 16, 16, 256));
+        return static_cast<std::size_t>(std::clamp<std::uint64_t>(
+            1 + 12 * num_triangles * sizeof(edge) / std::max<std::uint64_t>(budget, 1), 1, most));
+    }
+    void add_edge(const core::snapped_position& from, const core::snapped_position& to) {
+        if (place(from) < place(to)) fresh_.push_back({from, to, 1});
+        if (place(to) < place(from)) fresh_.push_back({to, from, -1});
     }
     // Most edges cancel between neighbours, which come one after the other; the others go to the bins.
     void sort_out() {

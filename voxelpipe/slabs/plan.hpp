@@ -259,23 +259,24 @@ struct classified {
     return t;
 }
 
-// The same for voxelize_solid with repair::vote, in slabs along z: rows along x and y count, so that a triangle beside
-// the grid along one of them does.
+// The same for voxelize_solid with repair::vote, in slabs along z: rows along all axes count, so that a triangle beside
+// the grid does that meets two of its intervals. Where it misses that of z, it is drawn, and its reach is empty: no
+// slab needs it.
 [[nodiscard]] inline classified classify_for_vote(const core::snap_transform& snap, const glm::ivec3& extent,
                                                   const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
     const auto snapped = [&](const glm::vec3& p) { return core::snap(snap, p.x, p.y, p.z); };
     const core::snapped_position p = snapped(a), q = snapped(b), r = snapped(c);
     const core::voxel_box whole{{{0, 0, 0}}, {{extent.x - 1, extent.y - 1, extent.z - 1}}};
-    constexpr std::int64_t far = std::int64_t{1} << core::coordinate_bits;
-    const core::voxel_box layers{{{-far, -far, 0}}, {{far, far, extent.z - 1}}};
     classified t;
-    t.kind = core::classify<coverage::conservative>(p, q, r, snap.fraction, layers, t.reach);
+    t.kind = core::classify_for_rows(p, q, r, snap.fraction, whole, true);
+    t.reach = {{{0, 0, 0}}, {{-1, -1, -1}}};
     if (t.kind != core::triangle_class::drawn) return t;
-    if (!core::meets_rows(p, q, r, snap.fraction, whole, true)) t.kind = core::triangle_class::outside;
+    t.reach = core::bounds(p, q, r, snap.fraction);
     for (int axis = 0; axis < 2; ++axis) {
         t.reach.lo[axis] = std::clamp(t.reach.lo[axis], whole.lo[axis], whole.hi[axis]);
         t.reach.hi[axis] = std::clamp(t.reach.hi[axis], whole.lo[axis], whole.hi[axis]);
     }
+    t.reach = core::intersect(t.reach, whole);
     return t;
 }
 

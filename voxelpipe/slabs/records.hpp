@@ -8,6 +8,7 @@
 
 #include <voxelpipe/core/threads.hpp>
 #include <voxelpipe/slabs/plan.hpp>
+#include <voxelpipe/solid.hpp>
 #include <voxelpipe/voxelize.hpp>
 
 #include <glm/vec3.hpp>
@@ -71,15 +72,32 @@ struct renumber_list {
 
 } // namespace detail
 
+// The calls that slabs will be drawn by, as far as it decides which triangles they need.
+struct binning {
+    coverage rule = coverage::conservative;             // of surfaces
+    bool is_solid = false;                              // for voxelize_solid
+    voxelpipe::repair repair = voxelpipe::repair::none; // of solids
+
+    // As classify(), for a triangle's three corners. `drawn` with an empty reach: counted as drawn, but no slab needs
+    // it.
+    [[nodiscard]] classified operator()(const core::snap_transform& snap, const glm::ivec3& extent,
+                                        const glm::vec3 (&at)[3]) const {
+        if (is_solid && repair == repair::vote) return classify_for_vote(snap, extent, at[0], at[1], at[2]);
+        if (is_solid && repair == repair::exterior) // a cover is all that counts
+            return classify(snap, extent, coverage::conservative, at[0], at[1], at[2]);
+        return classify(snap, extent, rule, at[0], at[1], at[2], is_solid);
+    }
+};
+
 // The triangles of a chunk as records. Shades its vertices when it is made; refers to the chunk.
 template <class Varyings, class Mesh>
 class chunk_records {
 public:
     // Triangle i has the number first_number + i, or + part.numbers[i] of a subset.
     template <class VertexShader>
-    chunk_records(const Mesh& chunk, const VertexShader& shader, const grid& g, coverage rule, bool is_solid,
+    chunk_records(const Mesh& chunk, const VertexShader& shader, const grid& g, const binning& how,
                   std::uint64_t first_number, unsigned threads = 1)
-        : chunk_(chunk), snap_(core::make_snap_transform(g)), extent_(g.extent), rule_(rule), is_solid_(is_solid),
+        : chunk_(chunk), snap_(core::make_snap_transform(g)), extent_(g.extent), how_(how),
           first_number_(first_number) {
         using plain = voxelpipe::draw<Mesh, VertexShader, constant_output<bool>>;
         const plain d{chunk, shader, {}};
@@ -103,49 +121,58 @@ public:
     template <class Visit>
     [[nodiscard]] status visit(std::size_t first, std::size_t last, counters& counts, Visit&& visit) const {
         for (std::size_t i = first; i < last; ++i) {
+            if (status s = check(i); !s.ok()) return s;
             const glm::uvec3 t = chunk_.triangles[i];
-            if (t.x >= vertices_.size() || t.y >= vertices_.size() || t.z >= vertices_.size()) {
-                status s = core::failure(status_code::index_out_of_range);
-                s.draw = 0;
-                s.triangle = static_cast<std::uint32_t>(i);
-                return s;
-            }
-            const std::uint64_t number = first_number_ + (chunk_.part.whole != 0 ? chunk_.part.numbers[i] : i);
-            if (number >= std::numeric_limits<std::uint32_t>::max())
-                return core::failure(status_code::too_many_triangles);
             record<Varyings> r;
             for (int k = 0; k < 3; ++k) {
                 const vertex_output<Varyings>& v = vertices_[t[k]];
                 r.positions[k] = v.position;
                 if constexpr (!std::is_empty_v<Varyings>) r.varyings[k] = v.varyings;
             }
-            r.number = static_cast<std::uint32_t>(number);
-            const classified c =
-                classify(snap_, extent_, rule_, r.positions[0], r.positions[1], r.positions[2], is_solid_);
+            r.number = static_cast<std::uint32_t>(number(i));
+            const classified c = how_(snap_, extent_, r.positions);
             core::count_class(counts, c.kind);
-            if (c.kind == core::triangle_class::drawn) visit(std::as_const(r), c.reach);
+            if (c.kind == core::triangle_class::drawn && !c.reach.empty()) visit(std::as_const(r), c.reach);
         }
         return {};
     }
+    // Calls visit(a, b, c) for the snapped corners of every triangle, wherever it lies, up to the first bad one.
+    template <class Visit>
+    void visit_snapped(Visit&& visit) const {
+        for (std::size_t i = 0; i < chunk_.triangles.size() && check(i).ok(); ++i) {
+            const glm::uvec3 t = chunk_.triangles[i];
+            const auto at = [&](std::uint32_t v) {
+                const glm::vec3& p = vertices_[v].position;
+                return core::snap(snap_, p.x, p.y, p.z);
+            };
+            visit(at(t.x), at(t.y), at(t.z));
+        }
+    }
 
 private:
+    [[nodiscard]] std::uint64_t number(std::size_t i) const {
+        return first_number_ + (chunk_.part.whole != 0 ? chunk_.part.numbers[i] : i);
+    }
+    [[nodiscard]] status check(std::size_t i) const {
+        const glm::uvec3 t = chunk_.triangles[i];
+        if (t.x >= vertices_.size() || t.y >= vertices_.size() || t.z >= vertices_.size()) {
+            status s = core::failure(status_code::index_out_of_range);
+            s.draw = 0;
+            s.triangle = static_cast<std::uint32_t>(i);
+            return s;
+        }
+        if (number(i) >= std::numeric_limits<std::uint32_t>::max())
+            return core::failure(status_code::too_many_triangles);
+        return {};
+    }
+
     const Mesh& chunk_;
     core::snap_transform snap_;
     glm::ivec3 extent_;
-    coverage rule_;
-    bool is_solid_;
+    binning how_;
     std::uint64_t first_number_;
     status valid_;
     core::raw_array<vertex_output<Varyings>> vertices_;
 };
-
-// All triangles of a chunk; see chunk_records.
-template <class Varyings, class Mesh, class VertexShader, class Visit>
-[[nodiscard]] status for_each_record(const Mesh& chunk, const VertexShader& shader, const grid& g, coverage rule,
-                                     bool is_solid, std::uint64_t first_number, counters& counts, Visit&& visit) {
-    const chunk_records<Varyings, Mesh> records(chunk, shader, g, rule, is_solid, first_number);
-    if (!records.valid().ok()) return records.valid();
-    return records.visit(0, chunk.triangles.size(), counts, visit);
-}
 
 } // namespace voxelpipe::slabs

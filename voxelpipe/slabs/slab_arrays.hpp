@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -43,6 +44,20 @@ struct slab_arrays {
             from.copy(first, std::span<record<Varyings>>(records));
             for (std::size_t i = 0; i < records.size(); ++i) put(first + i, records[i]);
         });
+    }
+
+    // One triangle that is dropped, for calls that need one.
+    [[nodiscard]] static slab_arrays dropped() {
+        constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+        slab_arrays a;
+        a.positions = core::raw_array<glm::vec3>(3);
+        a.triangles = core::raw_array<glm::uvec3>(1);
+        a.numbers = core::raw_array<std::uint32_t>(1);
+        a.varyings = core::raw_array<Varyings>(std::is_empty_v<Varyings> ? 0 : 3);
+        record<Varyings> r{};
+        for (glm::vec3& p : r.positions) p = glm::vec3(nan);
+        a.put(0, r);
+        return a;
     }
 
     [[nodiscard]] checked_indices good_indices() const {

@@ -17,42 +17,25 @@
 #include <voxelpipe/slabs/bins.hpp>
 #include <voxelpipe/slabs/plan.hpp>
 #include <voxelpipe/slabs/records.hpp>
+#include <voxelpipe/slabs/repairs.hpp>
 #include <voxelpipe/slabs/route.hpp>
 #include <voxelpipe/slabs/slab_arrays.hpp>
+#include <voxelpipe/slabs/slab_queue.hpp>
+#include <voxelpipe/slabs/stream_options.hpp>
 #include <voxelpipe/solid.hpp>
 #include <voxelpipe/sparse.hpp>
 #include <voxelpipe/voxelize.hpp>
 
 #include <algorithm>
 #include <cstdint>
-#include <deque>
-#include <future>
 #include <memory>
-#include <new>
 #include <stdexcept>
-#include <string>
 #include <thread>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace voxelpipe::slabs {
-
-// How a stream works.
-struct stream_options {
-    voxelize_options voxelize = {}; // of each slab's call
-    // Bytes for binned triangles, a slab's mesh and its targets, together. Lists and sparse results, whose size only
-    // the call finds out, come on top, and so does what source and sink hold.
-    std::uint64_t memory = std::uint64_t{1} << 30;
-    std::string folder = "/tmp"; // for bins that do not fit; about 40 bytes a triangle
-    int num_slabs = 0;           // to begin with, of equal thickness; 0: as many as the targets need
-    int align = 1;               // slabs begin at multiples of this: chunks of a file, or 8 for whole bricks
-    // Bytes that the backend takes for a triangle beside its record, and for a voxel; 0: an estimate. The estimate of a
-    // voxel is what the targets take.
-    double triangle_bytes = 0, voxel_bytes = 0;
-    bool is_solid = false; // for draw_solid: triangles beside the grid along x count too
-    unsigned threads = 0;  // of the host, that shade, bin and read; 0: all cores. Results do not depend on it
-};
 
 // What a sink gets beside a slab's framebuffer or lists.
 struct slab {
@@ -93,28 +76,26 @@ public:
 
     // The grid may be a crop. Throws std::invalid_argument for one that is not valid.
     record_stream(Backend& backend, const grid& g, stream_options options)
-        : backend_(backend), grid_(g), options_(std::move(options)),
+        : backend_(backend), grid_(checked(g)), options_(std::move(options)),
           threads_(options_.threads != 0 ? options_.threads : std::max(1u, std::thread::hardware_concurrency())),
-          router_(threads_, options_.memory / 16) {
-        if (const status s = validate(g); !s.ok()) throw std::invalid_argument("voxelpipe::slabs: " + s.message());
+          router_(threads_, options_.memory / 16),
+          repairs_(g, options_.repair, options_.memory / 8, options_.folder, threads_) {
+        options_.is_solid = options_.binning().is_solid;
         cut_into(equal_layers(g, 2, std::max(1, options_.num_slabs), options_.align));
     }
 
     // Slabs to begin with, in place of equal ones; before the first triangle.
     void cut_into(const plan& p) {
-        pending_.clear();
+        parts_.clear();
         axis_ = slabs_.axis = p.axis;
-        for (std::size_t i = 0; i < p.slabs.size(); ++i) {
-            if (p.slabs[i].size() == 0) continue;
-            pending_.push_back({p.crop(grid_, i), {}, {}});
-        }
-        bins_ = std::vector<bin<record_type>>(pending_.size());
+        for (std::size_t i = 0; i < p.slabs.size(); ++i)
+            if (p.slabs[i].size() != 0) parts_.push_back(p.crop(grid_, i));
+        bins_ = std::vector<bin<record_type>>(parts_.size());
         memory_ = std::make_unique<bin_memory<record_type>>(options_.memory / 4, bins_.size(), options_.folder);
         slabs_.of_layer.assign(static_cast<std::size_t>(grid_.extent[axis_]), 0);
-        for (std::size_t i = 0; i < pending_.size(); ++i) {
-            const int begin = pending_[i].where.offset[axis_] - grid_.offset[axis_];
-            std::fill_n(slabs_.of_layer.begin() + begin, pending_[i].where.extent[axis_],
-                        static_cast<std::uint32_t>(i));
+        for (std::size_t i = 0; i < parts_.size(); ++i) {
+            const int begin = parts_[i].offset[axis_] - grid_.offset[axis_];
+            std::fill_n(slabs_.of_layer.begin() + begin, parts_[i].extent[axis_], static_cast<std::uint32_t>(i));
         }
     }
 
@@ -123,16 +104,22 @@ public:
     // Counts of the triangles so far in the whole grid. Each is counted once, however many slabs it reaches.
     [[nodiscard]] const counters& counts() const { return counts_; }
     [[nodiscard]] counters& counts() { return counts_; }
-    // Records come by ascending number. reach: see classify(). Throws std::bad_alloc, and std::system_error of files.
+    // Records come by ascending number. reach: not empty, see binning. A repair is given what it needs apart. Throws
+    // std::bad_alloc, and std::system_error of files.
     void push(const record_type& r, const core::voxel_box& reach) {
         const auto [first, last] = slabs_(reach);
         for (std::uint32_t i = first; i <= last; ++i) memory_->push(bins_, i, r);
     }
-    // The `count` triangles of a chunk, which are added to the counts: a chunk_records. Throws as push().
+    // The `count` triangles of a chunk, which are added to the counts and the repair: a chunk_records. Throws as
+    // push().
     template <class Chunk>
     [[nodiscard]] status push_all(const Chunk& chunk, std::size_t count) {
+        if (repairs_.needs_triangles())
+            chunk.visit_snapped([&](const auto& a, const auto& b, const auto& c) { repairs_.add(a, b, c); });
         return router_.route(chunk, count, slabs_, bins_, *memory_, counts_);
     }
+    // Of stream_options::repair.
+    [[nodiscard]] solid_repairs& repairs() { return repairs_; }
     // Threads that work on the host.
     [[nodiscard]] unsigned threads() const { return threads_; }
 
@@ -143,68 +130,133 @@ public:
     // gave has reached the sink by then. Throws what make and sink throw, and std::system_error of files.
     template <class FragmentShader, class Make, class Sink>
     [[nodiscard]] status draw(const FragmentShader& shader, const Make& make, const Sink& sink) {
-        return draw_slabs<false>(shader, make, sink, [&](const auto& draws, const grid& g, auto& out) {
-            return voxelize(backend_, draws, g, out, options_.voxelize);
-        });
+        return draw_slabs<false>(shader, make, sink, solid_options{}, 0.75);
     }
-    // The same for solids, without repairs, in slabs along y and z. Counts of rows are sums over the slabs.
+    // The same for solids: the voxels, the counts and the counts of rows of one call with the whole mesh, which is one
+    // draw. Slabs are along y or z, with vote and exterior along z. how.repair is that of stream_options; how.cones and
+    // how.slab are found by the stream, and not given. Held beside the budget:
+    //   close_holes   the boundaries of the holes and their cones, about 100 bytes a boundary edge, and a slab's call
+    //                 its own copy of the cones
+    //   vote          three layers of bits of the grid
+    //   exterior      four layers of bits for each 8 layers of the grid at most, 40 layers more and 2 for each voxel of
+    //                 `closing` (slab_exterior::least_bytes), and the cover of a slab in bricks. A crop is refused, as
+    //                 by one call (crop_without_whole)
     template <class SolidShader, class Make, class Sink>
     [[nodiscard]] status draw_solid(const SolidShader& shader, const Make& make, const Sink& sink,
                                     const solid_options& how = {}) {
-        if (how.repair != repair::none || !options_.is_solid || axis_ == 0)
+        if (!options_.is_solid || how.repair != options_.repair || how.slab != nullptr || how.cones != nullptr ||
+            axis_ == 0 || (repairs_.is_along_z() && axis_ != 2))
             return core::failure(status_code::bad_solid_options);
-        return draw_slabs<true>(shader, make, sink, [&](const auto& draws, const grid& g, auto& out) {
-            return voxelize_solid(backend_, draws, g, out, how);
-        });
+        if (const status s = core::validate(how, grid_); !s.ok()) return s;
+        if (repairs_.is_along_z() && !core::takes_solid_slabs<Backend>)
+            return core::failure(status_code::strategy_unavailable);
+        if (const status s = repairs_.begin(how); !s.ok()) return s;
+        // The flood has an eighth of the memory.
+        return draw_slabs<true>(shader, make, sink, how, repairs_.needs_walls() ? 0.625 : 0.75);
     }
 
 private:
     using arrays = detail::slab_arrays<Varyings>;
-    struct pending_slab {
-        grid where;
-        bin<record_type> triangles;
-        std::future<arrays> loading; // begun while another slab is drawn
-    };
+    using queue_type = detail::slab_queue<Varyings>;
     using mesh_types = detail::slab_mesh<Varyings>;
 
-    template <bool IsSolid, class Shader, class Make, class Sink, class Call>
-    [[nodiscard]] status draw_slabs(const Shader& shader, const Make& make, const Sink& sink, const Call& call) {
+    [[nodiscard]] static const grid& checked(const grid& g) {
+        if (const status s = validate(g); !s.ok()) throw std::invalid_argument("voxelpipe::slabs: " + s.message());
+        return g;
+    }
+
+    // share: of the memory, that a slab may take.
+    template <bool IsSolid, class Shader, class Make, class Sink>
+    [[nodiscard]] status draw_slabs(const Shader& shader, const Make& make, const Sink& sink, const solid_options& how,
+                                    double share) {
         using output = std::remove_cvref_t<decltype(make(grid_.extent))>;
-        if (detail::is_abuffer<output> && axis_ != 2) return core::failure(status_code::bad_crop);
-        const costs cost = costs_of(options_, detail::bytes_per_voxel<output>);
-        lists_ = detail::is_abuffer<output>;
-        for (std::size_t i = 0; i < pending_.size(); ++i) pending_[i].triangles = std::move(bins_[i]);
+        constexpr bool lists = detail::is_abuffer<output>;
+        if (lists && axis_ != 2) return core::failure(status_code::bad_crop);
+        queue_type queue;
+        queue.start(options_, threads_, axis_, lists || repairs_.is_along_z() ? 2 : IsSolid ? 1 : 0);
+        for (std::size_t i = 0; i < parts_.size(); ++i) queue.push_back(parts_[i], std::move(bins_[i]));
         bins_.clear();
+        parts_.clear();
+        if constexpr (IsSolid)
+            if (repairs_.needs_walls())
+                if (const status s = find_outside(queue, share); !s.ok()) return s;
         status all;
-        while (!pending_.empty()) {
-            pending_slab& next = pending_.front();
-            if (cost.of(next) > cost.limit && cut_front(cost, cost.limit)) continue;
-            slab s;
-            s.where = next.where;
-            s.voxels_before = all.counts.voxels;
-            s.fragments_before = all.counts.fragments;
-            try {
-                arrays triangles = next.loading.valid() ? next.loading.get() : arrays(next.triangles, threads_);
-                begin_loading(cost);
-                output out = make(s.where.extent);
-                s.drawn = draw_one<IsSolid>(std::move(triangles), shader, s.where, out, call);
-                if (s.drawn.ok()) {
-                    add_drawn(all, s.drawn);
-                    sink(std::as_const(s), out);
+        const double voxel = detail::bytes_per_voxel<output> + repairs_.voxel_bytes();
+        const status s = queue.for_each(
+            detail::costs_of<Varyings>(options_, voxel, share), false,
+            [&](const typename queue_type::entry& next, arrays triangles) {
+                slab part;
+                part.where = next.where;
+                part.voxels_before = all.counts.voxels;
+                part.fragments_before = all.counts.fragments;
+                output out = make(part.where.extent);
+                if constexpr (IsSolid) {
+                    enter(next);
+                    if (triangles.numbers.size() == 0 && repairs_.fills_without_triangles())
+                        triangles = arrays::dropped();
+                    const solid_options of_slab = repairs_.of(part.where, how);
+                    part.drawn = draw_one<true>(std::move(triangles), shader, part.where, out,
+                                                [&](const auto& draws, const grid& g, auto& to) {
+                                                    return voxelize_solid(backend_, draws, g, to, of_slab);
+                                                });
+                } else {
+                    part.drawn = draw_one<false>(std::move(triangles), shader, part.where, out,
+                                                 [&](const auto& draws, const grid& g, auto& to) {
+                                                     return voxelize(backend_, draws, g, to, options_.voxelize);
+                                                 });
                 }
-            } catch (const std::bad_alloc&) {
-                s.drawn = core::failure(status_code::out_of_memory);
-            }
-            if (s.drawn.code == status_code::out_of_memory && cut_front(cost, cost.of(next) / 2)) continue;
-            if (!s.drawn.ok()) return s.drawn;
-            pending_.pop_front();
-        }
+                if (part.drawn.ok()) {
+                    add_drawn(all, part.drawn);
+                    sink(std::as_const(part), out);
+                    if constexpr (IsSolid) repairs_.leave();
+                }
+                return part.drawn;
+            });
+        if (!s.ok()) return s;
+        if constexpr (IsSolid) repairs_.count(all.solid);
         const counters drawn = all.counts;
         all.counts = counts_;
         all.counts.fragments = drawn.fragments;
         all.counts.fragments_discarded = drawn.fragments_discarded;
         all.counts.voxels = drawn.voxels;
         return all;
+    }
+
+    // Shows the repair the triangles of a slab.
+    void enter(const typename queue_type::entry& next) {
+        const core::snap_transform snap = core::make_snap_transform(grid_);
+        repairs_.enter(next.where, [&](const auto& visit) {
+            next.triangles.for_each_block([&](std::span<const record_type> block) {
+                for (const record_type& r : block) {
+                    const auto at = [&](int i) {
+                        const glm::vec3& p = r.positions[i];
+                        return core::snap(snap, p.x, p.y, p.z);
+                    };
+                    visit(at(0), at(1), at(2));
+                }
+            });
+        });
+    }
+    // Draws the cover of all slabs, for the flood.
+    [[nodiscard]] status find_outside(queue_type& queue, double share) {
+        using cover = sparse_framebuffer<Backend, target<bit, blend::bit_or>>;
+        voxelize_options how;
+        how.rule = coverage::conservative;
+        how.count_voxels = false;
+        const status s = queue.for_each(detail::costs_of<Varyings>(options_, repairs_.voxel_bytes(), share), true,
+                                        [&](const typename queue_type::entry& next, arrays triangles) -> status {
+                                            if (triangles.numbers.size() == 0) return {};
+                                            cover out(backend_, next.where.extent);
+                                            const status drawn =
+                                                draw_one<false>(std::move(triangles), constant(true), next.where, out,
+                                                                [&](const auto& draws, const grid& g, auto& to) {
+                                                                    return voxelize(backend_, draws, g, to, how);
+                                                                });
+                                            if (drawn.ok()) repairs_.add_walls(out.to_host(backend_).table());
+                                            return drawn;
+                                        });
+        if (s.ok()) repairs_.flood();
+        return s;
     }
 
     template <bool IsSolid, class Shader, class Output, class Call>
@@ -238,99 +290,17 @@ private:
         }
     }
 
-    // Bytes of a slab.
-    struct costs {
-        double triangle, voxel, limit;
-        [[nodiscard]] double of(const pending_slab& s) const {
-            const glm::ivec3 e = s.where.extent;
-            return triangle * static_cast<double>(s.triangles.size()) + voxel * static_cast<double>(e.x) * e.y * e.z;
-        }
-    };
-    [[nodiscard]] static costs costs_of(const stream_options& options, double voxel_bytes) {
-        // Twice a mesh of positions, varyings, indices and number, since the next slab's is read meanwhile, and a copy
-        // of both for backends with a memory of their own.
-        constexpr double mesh =
-            3 * sizeof(glm::vec3) + sizeof(glm::uvec3) + 4 + (std::is_empty_v<Varyings> ? 0.0 : 3.0 * sizeof(Varyings));
-        // Snapped positions, varyings and tile pairs of cpu_backend.
-        constexpr double work = 3 * 24 + (std::is_empty_v<Varyings> ? 0.0 : 3.0 * sizeof(Varyings)) + 48;
-        return {2 * sizeof(record_type) + 2 * mesh + (options.triangle_bytes > 0 ? options.triangle_bytes : work),
-                options.voxel_bytes > 0 ? options.voxel_bytes : voxel_bytes,
-                0.75 * static_cast<double>(options.memory)};
-    }
-
-    // Reads the slab behind the first one from its file, if it will be drawn as it is.
-    void begin_loading(const costs& cost) {
-        if (pending_.size() < 2) return;
-        pending_slab& next = pending_[1];
-        if (next.loading.valid() || next.triangles.in_file() == 0 || cost.of(next) > cost.limit) return;
-        next.loading = std::async(
-            std::launch::async, [&next, threads = std::min(4u, threads_)] { return arrays(next.triangles, threads); });
-    }
-
-    // Replaces the first slab by parts whose costs are at most `limit`, two at least. False if it cannot be cut.
-    [[nodiscard]] bool cut_front(const costs& cost, double limit) {
-        pending_slab whole = std::move(pending_.front());
-        const int step = std::max(1, options_.align);
-        int axis = axis_;
-        for (const int a : {axis_, 2, 1, 0}) {
-            axis = a;
-            if (whole.where.extent[a] > step) break;
-            if (lists_ || (options_.is_solid && a == 1)) break;
-        }
-        if (whole.where.extent[axis] <= step || (options_.is_solid && axis == 0)) {
-            pending_.front() = std::move(whole);
-            return false;
-        }
-        const glm::ivec3 extent = whole.where.extent;
-        const core::snap_transform snap = core::make_snap_transform(whole.where);
-        const auto reach_of = [&](const record_type& r) {
-            return classify(snap, extent, options_.voxelize.rule, r.positions[0], r.positions[1], r.positions[2],
-                            options_.is_solid)
-                .reach;
-        };
-        histogram counts(extent);
-        whole.triangles.for_each_block([&](std::span<const record_type> block) {
-            for (const record_type& r : block)
-                if (const core::voxel_box reach = reach_of(r); !reach.empty()) counts.add(reach);
-        });
-        plan_options how;
-        how.align = step;
-        const double layer = static_cast<double>(extent.x) * extent.y * extent.z / extent[axis] * cost.voxel;
-        how.triangle_cost = static_cast<std::uint64_t>(cost.triangle);
-        how.layer_cost = static_cast<std::uint64_t>(layer);
-        plan parts = cover(counts, axis, static_cast<std::uint64_t>(std::max(1.0, limit)), how);
-        if (parts.slabs.size() < 2) parts = equal_layers(whole.where, axis, 2, step);
-        // Triangles that reach most of the slab would be in most of the parts, which makes nothing smaller.
-        if (parts.triangles_cut > parts.triangles) parts = equal_layers(whole.where, axis, 2, step);
-
-        std::vector<bin<record_type>> bins(parts.slabs.size());
-        bin_memory<record_type> memory(options_.memory / 8, bins.size(), options_.folder);
-        whole.triangles.for_each_block([&](std::span<const record_type> block) {
-            for (const record_type& r : block) {
-                const core::voxel_box reach = reach_of(r);
-                if (reach.empty()) continue;
-                for (std::size_t i = 0; i < bins.size(); ++i)
-                    if (reach.lo[axis] < parts.slabs[i].end && reach.hi[axis] >= parts.slabs[i].begin)
-                        memory.push(bins, i, r);
-            }
-        });
-        pending_.pop_front();
-        for (std::size_t i = bins.size(); i-- > 0;)
-            pending_.push_front({parts.crop(whole.where, i), std::move(bins[i]), {}});
-        return true;
-    }
-
     Backend& backend_;
     grid grid_;
     stream_options options_;
     int axis_ = 2;
-    bool lists_ = false;
     counters counts_;
     unsigned threads_;
     detail::slab_table slabs_;
     detail::chunk_router<record_type> router_;
-    std::deque<pending_slab> pending_;
-    std::vector<bin<record_type>> bins_; // of the pending slabs, until they are drawn
+    solid_repairs repairs_;
+    std::vector<grid> parts_;            // slabs to begin with, until they are drawn
+    std::vector<bin<record_type>> bins_; // of these
     std::unique_ptr<bin_memory<record_type>> memory_;
 };
 
@@ -348,12 +318,12 @@ class stream : public record_stream<Backend, detail::varyings_of<Mesh, VertexSha
 public:
     // Throws std::invalid_argument for a grid that is not valid.
     stream(Backend& backend, const grid& g, const VertexShader& shader, const stream_options& options = {})
-        : base(backend, g, options), shader_(shader), rule_(options.voxelize.rule), is_solid_(options.is_solid) {}
+        : base(backend, g, options), shader_(shader), how_(options.binning()) {}
 
     // Adds triangles of host memory; they are numbered on from those before. Fails for an index that names no vertex,
     // for more than 2^32 - 1 triangles, and for instances. What was added before a failure stays.
     [[nodiscard]] status add(const Mesh& chunk) {
-        const chunk_records<varyings, Mesh> records(chunk, shader_, this->where(), rule_, is_solid_, num_triangles_,
+        const chunk_records<varyings, Mesh> records(chunk, shader_, this->where(), how_, num_triangles_,
                                                     this->threads());
         const status s = records.valid().ok() ? this->push_all(records, chunk.triangles.size()) : records.valid();
         if (s.ok()) num_triangles_ += chunk.part.whole != 0 ? chunk.part.whole : chunk.triangles.size();
@@ -364,8 +334,7 @@ public:
 
 private:
     VertexShader shader_;
-    coverage rule_;
-    bool is_solid_;
+    binning how_;
     std::uint64_t num_triangles_ = 0;
 };
 

@@ -1,0 +1,337 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Solids of meshes with holes in a stream: with every repair all slabs together are one call with the whole mesh, with
+// the same counts, into every kind of output.
+
+#include "broken_scene.hpp"
+
+namespace {
+
+using namespace slab_scene;
+
+struct winding {
+    auto operator()(const vp::solid_fragment& f) const {
+        return vp::outputs(static_cast<std::int32_t>(f.winding + 3 * f.voxel.z + 100));
+    }
+};
+using targets = vp::framebuffer<backend_type, vp::target<std::int32_t, vp::blend::add>>;
+using stream_type = slabs::stream<backend_type, vp::passthrough>;
+
+slabs::stream_options options_for(const vp::solid_options& solid, int num_slabs,
+                                  std::uint64_t memory = std::uint64_t{1} << 30) {
+    slabs::stream_options o;
+    o.num_slabs = num_slabs;
+    o.memory = memory;
+    o.folder = ::testing::TempDir();
+    o.is_solid = true;
+    o.repair = solid.repair;
+    return o;
+}
+// In chunks of 7 triangles.
+void feed(stream_type& stream, const unit::small_mesh& mesh) {
+    const auto& all = mesh.triangles;
+    for (std::size_t first = 0; first < all.size(); first += 7)
+        stream
+            .add({mesh.positions,
+                  vp::array_view<const glm::uvec3>(all.data() + first, std::min<std::size_t>(7, all.size() - first))})
+            .or_throw();
+}
+
+// One call, and streams that are compared with it.
+struct whole_solid {
+    unit::small_mesh mesh;
+    vp::grid grid;
+    vp::solid_options options;
+    backend_type backend = unit::make_backend(2);
+    targets expected{backend, grid.extent};
+    vp::status one = vp::voxelize_solid(backend, mesh.view(), grid, vp::passthrough{}, winding{}, expected, options);
+
+    // Returns the number of slabs.
+    int expect_stream(const slabs::stream_options& how, const slabs::plan* plan = nullptr) {
+        EXPECT_TRUE(one.ok()) << one.message();
+        stream_type stream(backend, grid, {}, how);
+        if (plan != nullptr) stream.cut_into(*plan);
+        feed(stream, mesh);
+        const auto all = vp::get<0>(expected).to_host_target(backend);
+        std::size_t wrong = 0, voxels = 0;
+        int slabs = 0;
+        const vp::status s = stream.draw_solid(
+            winding{},
+            [&](glm::ivec3 size) {
+                return targets{backend, size};
+            },
+            [&](const slabs::slab& slab, const targets& fb) {
+                const auto part = vp::get<0>(fb).to_host_target(backend);
+                const glm::ivec3 o = slab.where.offset - grid.offset;
+                unit::for_each_voxel(slab.where.extent, [&](int x, int y, int z) {
+                    wrong += part(x, y, z) != all(o.x + x, o.y + y, o.z + z) ? 1 : 0;
+                    ++voxels;
+                });
+                ++slabs;
+            },
+            options);
+        EXPECT_TRUE(s.ok()) << s.message();
+        EXPECT_EQ(wrong, 0u);
+        EXPECT_EQ(voxels, static_cast<std::size_t>(grid.extent.x) * static_cast<std::size_t>(grid.extent.y) *
+                              static_cast<std::size_t>(grid.extent.z));
+        EXPECT_EQ(s.counts, one.counts);
+        EXPECT_EQ(s.solid, one.solid);
+        return slabs;
+    }
+};
+
+// Every repair, with what goes with it.
+std::vector<vp::solid_options> all_repairs() {
+    std::vector<vp::solid_options> all;
+    for (const auto of : {vp::bodies::call, vp::bodies::draw}) {
+        for (const auto rule : {vp::fill_rule::even_odd, vp::fill_rule::nonzero, vp::fill_rule::positive})
+            for (const auto inside : {vp::solid_extent::centre, vp::solid_extent::outer, vp::solid_extent::inner})
+                all.push_back({.rule = rule, .bodies = of, .extent = inside, .repair = vp::repair::close_holes});
+        all.push_back({.bodies = of, .repair = vp::repair::close_holes, .max_hole_edges = 3});
+        all.push_back({.bodies = of, .repair = vp::repair::vote});
+        for (const int closing : {0, 1, 4})
+            all.push_back({.bodies = of, .repair = vp::repair::exterior, .closing = closing});
+    }
+    return all;
+}
+template <class F>
+void for_all_repairs(F&& f) {
+    for (const vp::solid_options& o : all_repairs()) {
+        SCOPED_TRACE("repair " + std::to_string(static_cast<int>(o.repair)) + ", rule " +
+                     std::to_string(static_cast<int>(o.rule)) + ", extent " +
+                     std::to_string(static_cast<int>(o.extent)) + ", bodies " +
+                     std::to_string(static_cast<int>(o.bodies)) + ", closing " + std::to_string(o.closing));
+        f(o);
+    }
+}
+
+TEST(RepairedStream, SlabsAreTheWhole) {
+    std::uint64_t voxels = 0;
+    for (const glm::ivec3& size : {glm::ivec3(37, 33, 42), glm::ivec3(65, 7, 11), glm::ivec3(5, 6, 7)})
+        for_all_repairs([&](const vp::solid_options& o) {
+            whole_solid whole{broken_scene(size), unit::unit_grid(size), o};
+            voxels += whole.one.counts.voxels;
+            for (int n = 1; n <= 7; ++n) {
+                SCOPED_TRACE(n);
+                EXPECT_EQ(whole.expect_stream(options_for(o, n)), n);
+            }
+        });
+    EXPECT_GT(voxels, 100'000u);
+}
+
+// So little memory that bins, edges and walls go to disk, and slabs are cut again: those of a vote and of an exterior
+// along z alone, others along y too.
+TEST(RepairedStream, SlabsOfLittleMemoryAreTheWhole) {
+    for_all_repairs([&](const vp::solid_options& o) {
+        whole_solid whole{broken_scene(extent), unit::unit_grid(extent), o};
+        EXPECT_GT(whole.expect_stream(options_for(o, 2, 60'000)), 4);
+        slabs::stream_options aligned = options_for(o, 0, 90'000);
+        aligned.align = 8;
+        EXPECT_GT(whole.expect_stream(aligned), 3);
+    });
+}
+
+TEST(RepairedStream, SlabsAlongY) {
+    for_all_repairs([&](const vp::solid_options& o) {
+        if (o.repair != vp::repair::close_holes) return;
+        whole_solid whole{broken_scene(extent), unit::unit_grid(extent), o};
+        const slabs::plan along_y = slabs::equal_layers(whole.grid, 1, 5);
+        EXPECT_EQ(whole.expect_stream(options_for(o, 1), &along_y), 5);
+    });
+}
+
+TEST(RepairedStream, OfACropIsTheCrop) {
+    for_all_repairs([&](const vp::solid_options& o) {
+        if (o.repair == vp::repair::exterior) return;
+        whole_solid whole{broken_scene(extent), unit::unit_grid(extent).crop({3, 5, 9}, {30, 21, 22}), o};
+        for (const int n : {1, 3, 5}) EXPECT_EQ(whole.expect_stream(options_for(o, n)), n);
+        EXPECT_GT(whole.expect_stream(options_for(o, 1, 60'000)), 2);
+    });
+}
+
+TEST(RepairedStream, OfPlatesThatColumnsDecide) {
+    for (const auto kind : {vp::repair::vote, vp::repair::exterior, vp::repair::close_holes}) {
+        whole_solid whole{plates(extent), unit::unit_grid(extent), {.repair = kind}};
+        for (int n = 1; n <= 42; n += n < 7 ? 1 : 7) (void)whole.expect_stream(options_for(whole.options, n));
+    }
+}
+
+TEST(RepairedStream, SlabsOfListsFollowEachOther) {
+    struct payload {
+        auto operator()(const vp::solid_fragment& f) const {
+            return vp::outputs(static_cast<std::uint32_t>(f.voxel.x + 64 * f.voxel.y + 4096 * f.voxel.z))
+                .discard_if((f.voxel.x + f.voxel.z) % 5 == 0);
+        }
+    };
+    using lists = vp::abuffer<backend_type, std::uint32_t>;
+    const unit::small_mesh mesh = broken_scene(extent);
+    const vp::grid grid = unit::unit_grid(extent);
+    backend_type backend = unit::make_backend(2);
+    for_all_repairs([&](const vp::solid_options& o) {
+        lists whole{backend};
+        const vp::status one = vp::voxelize_solid(backend, mesh.view(), grid, vp::passthrough{}, payload{}, whole, o);
+        ASSERT_TRUE(one.ok()) << one.message();
+        stream_type stream(backend, grid, {}, options_for(o, 3, 120'000));
+        feed(stream, mesh);
+        vp::host_abuffer<std::uint32_t> all;
+        const vp::status s = stream.draw_solid(
+            payload{}, [&](glm::ivec3) { return lists{backend}; },
+            [&](const slabs::slab& slab, const lists& part) {
+                EXPECT_EQ(slab.voxels_before, all.voxels.size());
+                slabs::append(all, grid, slab, part.to_host(backend));
+            },
+            o);
+        EXPECT_TRUE(s.ok()) << s.message();
+        EXPECT_EQ(s.counts, one.counts);
+        EXPECT_EQ(s.solid, one.solid);
+        expect_equal(all, whole.to_host(backend));
+    });
+}
+
+// A constant gives bricks and tiles, which merge() joins over the borders of slabs.
+TEST(RepairedStream, SlabsOfSparseFramebuffersMerge) {
+    using bits = vp::sparse_framebuffer<backend_type, vp::target<vp::bit, vp::blend::bit_or>>;
+    using host_bits = typename host_of<bits>::type;
+    const unit::small_mesh mesh = broken_scene(extent);
+    const vp::grid grid = unit::unit_grid(extent);
+    backend_type backend = unit::make_backend(2);
+    for_all_repairs([&](const vp::solid_options& o) {
+        bits whole{backend, extent};
+        const vp::status one =
+            vp::voxelize_solid(backend, mesh.view(), grid, vp::passthrough{}, vp::constant(true), whole, o);
+        ASSERT_TRUE(one.ok()) << one.message();
+        for (const int n : {1, 5}) {
+            stream_type stream(backend, grid, {}, options_for(o, n));
+            feed(stream, mesh);
+            std::vector<host_bits> parts;
+            const vp::status s = stream.draw_solid(
+                vp::constant(true),
+                [&](glm::ivec3 size) {
+                    return bits{backend, size};
+                },
+                [&](const slabs::slab&, const bits& part) { parts.push_back(part.to_host(backend)); }, o);
+            EXPECT_TRUE(s.ok()) << s.message();
+            EXPECT_EQ(s.counts, one.counts);
+            EXPECT_EQ(s.solid, one.solid);
+            EXPECT_TRUE(vp::same_contents(vp::merge(std::span<const host_bits>(parts)), whole.to_host(backend)));
+        }
+    });
+}
+
+TEST(RepairedStream, ASlabThatRunsOutOfMemoryIsCutAgain) {
+    for (const auto kind : {vp::repair::close_holes, vp::repair::vote, vp::repair::exterior}) {
+        whole_solid whole{broken_scene(extent), unit::unit_grid(extent), {.repair = kind}};
+        stream_type stream(whole.backend, whole.grid, {}, options_for(whole.options, 2));
+        feed(stream, whole.mesh);
+        const auto all = vp::get<0>(whole.expected).to_host_target(whole.backend);
+        std::size_t wrong = 0;
+        int refused = 0;
+        const vp::status s = stream.draw_solid(
+            winding{},
+            [&](glm::ivec3 size) {
+                if (size.z > 6 && ++refused != 0) throw std::bad_alloc();
+                return targets{whole.backend, size};
+            },
+            [&](const slabs::slab& slab, const targets& fb) {
+                const auto part = vp::get<0>(fb).to_host_target(whole.backend);
+                unit::for_each_voxel(slab.where.extent, [&](int x, int y, int z) {
+                    wrong += part(x, y, z) != all(x, y, slab.where.offset.z + z) ? 1 : 0;
+                });
+            },
+            whole.options);
+        EXPECT_TRUE(s.ok()) << s.message();
+        EXPECT_GT(refused, 2);
+        EXPECT_EQ(wrong, 0u);
+        EXPECT_EQ(s.counts, whole.one.counts);
+        EXPECT_EQ(s.solid, whole.one.solid);
+    }
+}
+
+TEST(RepairedStream, WithoutTrianglesGivesClearedSlabs) {
+    for (const auto kind : {vp::repair::close_holes, vp::repair::vote, vp::repair::exterior}) {
+        whole_solid whole{{}, unit::unit_grid(extent), {.repair = kind}};
+        EXPECT_EQ(whole.expect_stream(options_for(whole.options, 3)), 3);
+    }
+}
+
+// A bad index ends a chunk; what came before it stays, for the repair too.
+TEST(RepairedStream, ABadIndexLeavesWhatCameBefore) {
+    for (const auto kind : {vp::repair::close_holes, vp::repair::vote, vp::repair::exterior}) {
+        unit::small_mesh bad = broken_scene(extent);
+        const std::size_t good = bad.triangles.size() / 2;
+        whole_solid whole{bad, unit::unit_grid(extent), {.repair = kind}};
+        whole.mesh.triangles.resize(good);
+        whole.one = vp::voxelize_solid(whole.backend, whole.mesh.view(), whole.grid, vp::passthrough{}, winding{},
+                                       whole.expected, whole.options);
+        bad.triangles[good].y = 1'000'000;
+        stream_type stream(whole.backend, whole.grid, {}, options_for(whole.options, 3));
+        const vp::status failed = stream.add(bad.view());
+        EXPECT_EQ(failed.code, vp::status_code::index_out_of_range);
+        EXPECT_EQ(failed.triangle, good);
+        std::uint64_t sum = 0, expected = 0;
+        const auto add = [&](std::uint64_t& to, const targets& fb) {
+            for (const std::int32_t v : vp::get<0>(fb).to_host(whole.backend)) to += static_cast<std::uint32_t>(v);
+        };
+        const vp::status s = stream.draw_solid(
+            winding{},
+            [&](glm::ivec3 size) {
+                return targets{whole.backend, size};
+            },
+            [&](const slabs::slab&, const targets& fb) { add(sum, fb); }, whole.options);
+        add(expected, whole.expected);
+        EXPECT_TRUE(s.ok()) << s.message();
+        EXPECT_EQ(sum, expected);
+        EXPECT_EQ(s.counts.voxels, whole.one.counts.voxels);
+        EXPECT_EQ(s.solid, whole.one.solid);
+    }
+}
+
+TEST(RepairedStream, SaysWhatIsWrong) {
+    backend_type backend;
+    const vp::grid grid = unit::unit_grid(extent);
+    const auto code = [&](const vp::grid& g, const slabs::stream_options& how, const vp::solid_options& o,
+                          int axis = 2) {
+        stream_type stream(backend, g, {}, how);
+        stream.cut_into(slabs::equal_layers(g, axis, 3));
+        return stream
+            .draw_solid(
+                winding{},
+                [&](glm::ivec3 size) {
+                    return targets{backend, size};
+                },
+                [](const slabs::slab&, const targets&) {}, o)
+            .code;
+    };
+    using vp::status_code;
+    const vp::solid_options vote{.repair = vp::repair::vote}, flood{.repair = vp::repair::exterior},
+        close{.repair = vp::repair::close_holes};
+    EXPECT_EQ(code(grid, options_for(vote, 1), vote), status_code::ok);
+    EXPECT_EQ(code(grid, options_for({}, 1), vote), status_code::bad_solid_options) << "the stream was told of none";
+    EXPECT_EQ(code(grid, options_for(vote, 1), {}), status_code::bad_solid_options);
+    EXPECT_EQ(code(grid, options_for(vote, 1), flood), status_code::bad_solid_options);
+    EXPECT_EQ(code(grid, options_for(vote, 1), vote, 1), status_code::bad_solid_options) << "along y";
+    EXPECT_EQ(code(grid, options_for(flood, 1), flood, 1), status_code::bad_solid_options);
+    EXPECT_EQ(code(grid, options_for(close, 1), close, 1), status_code::ok);
+    EXPECT_EQ(code(grid, options_for(close, 1), close, 0), status_code::bad_solid_options) << "along x";
+    EXPECT_EQ(code(grid.crop({0, 0, 1}, {9, 9, 9}), options_for(flood, 1), flood), status_code::crop_without_whole);
+    const std::uint64_t word = 0;
+    vp::solid_slab bits;
+    bits.inside = &word;
+    vp::solid_options given = flood;
+    given.slab = &bits;
+    EXPECT_EQ(code(grid, options_for(flood, 1), given), status_code::bad_solid_options);
+    const vp::core::hole_cones cones;
+    given = close;
+    given.cones = &cones;
+    EXPECT_EQ(code(grid, options_for(close, 1), given), status_code::bad_solid_options);
+    given = flood;
+    given.closing = 65;
+    EXPECT_EQ(code(grid, options_for(flood, 1), given), status_code::bad_solid_options);
+    // A repair makes the stream one of solids.
+    slabs::stream_options how = options_for(vote, 1);
+    how.is_solid = false;
+    EXPECT_EQ(code(grid, how, vote), status_code::ok);
+}
+
+} // namespace
