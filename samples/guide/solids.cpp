@@ -3,6 +3,7 @@
 // Solids: the inside of parts that overlap, a material for each draw, and a mesh with a hole. Exits with 0 when the
 // counts are those of the boxes.
 #include <cpu_ref/backend.hpp>
+#include <voxelpipe/slabs/stream.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <cstdint>
@@ -63,5 +64,22 @@ int main() {
     // end snippet
     good = good && closed.counts.voxels == std::uint64_t{4} * 4 * 12 && closed.solid.holes == 1 &&
            closed.solid.open_rows == 0;
+
+    // snippet: stream
+    namespace slabs = vp::slabs;
+    using bits = vp::sparse_framebuffer<vp::cpu_backend, vp::target<vp::bit, vp::blend::bit_or>>;
+    std::uint64_t filled = 0;
+    slabs::stream stream(backend, grid, vp::passthrough{}, {.num_slabs = 4, .repair = vp::repair::close_holes});
+    stream.add(open).or_throw(); // as often as there are chunks
+    const vp::status streamed = stream.draw_solid(
+        vp::constant(true),
+        [&](glm::ivec3 extent) {
+            return bits{backend, extent};
+        },
+        [&](const slabs::slab&, const bits& voxels) { filled += voxels.num_voxels(); },
+        {.repair = vp::repair::close_holes});
+    // as `closed`, voxels and all counts, of slabs that never were in memory together
+    // end snippet
+    good = good && streamed.counts == closed.counts && streamed.solid == closed.solid && filled == closed.counts.voxels;
     return good ? 0 : 1;
 }

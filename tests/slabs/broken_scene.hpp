@@ -72,7 +72,7 @@ inline unit::small_mesh broken_scene(const glm::ivec3& size) {
 inline unit::small_mesh plates(const glm::ivec3& size) {
     unit::small_mesh m;
     const auto x = static_cast<float>(size.x), y = static_cast<float>(size.y), z = static_cast<float>(size.z);
-    for (const float at : {-2.5f, 6.75f, 12.25f, 13.0f, 20.5f, z - 6.25f, z + 1.5f})
+    for (const float at : {-2.5f, 6.75f, 12.25f, 13.0f, 20.5f, z - 6.25f, z + 1.5f, z + 2.5f})
         add_quad(m, {0, 0, at}, {x, 0, at}, {x, y, at}, {0, y, at});
     add_quad(m, {1, 0, 0}, {1, y, 0}, {1, y, z}, {1, 0, z});
     add_quad(m, {0, 1, 0}, {x, 1, 0}, {x, 1, z}, {0, 1, z});

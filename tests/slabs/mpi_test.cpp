@@ -4,7 +4,7 @@
 // Slabs over MPI ranks, run by mpiexec with 1 to 4 of them: each rank compares its slab with one call that draws the
 // whole.
 
-#include "slab_scene.hpp"
+#include "broken_scene.hpp"
 
 #include <voxelpipe/slabs/mpi.hpp>
 
@@ -132,6 +132,78 @@ TEST_P(Ranks, SparseSlabsAreCropsOfTheWhole) {
     EXPECT_TRUE(s.ok()) << s.message();
     EXPECT_EQ(s.counts, counts);
     EXPECT_EQ(sum_of_ranks(voxels), expected.num_voxels());
+}
+
+// Solids of meshes with holes, whose triangles the ranks have read in shares; of a crop, too.
+TEST(RankSolids, RepairedSlabsAreTheWhole) {
+    struct winding {
+        auto operator()(const vp::solid_fragment& f) const {
+            return vp::outputs(static_cast<std::int32_t>(f.winding + f.voxel.z + 100));
+        }
+    };
+    using targets = vp::framebuffer<backend_type, vp::target<std::int32_t, vp::blend::add>>;
+    using solid_stream = slabs::mpi_stream<backend_type, vp::passthrough>;
+    backend_type backend = unit::make_backend(1);
+    const vp::grid uncut = unit::unit_grid(extent);
+    for (const vp::grid& grid : {uncut, uncut.crop({3, 5, 9}, {30, 21, 22})})
+        for (const unit::small_mesh& mesh : {broken_scene(extent), plates(extent)})
+            for (const std::uint64_t memory : {std::uint64_t{1} << 30, std::uint64_t{120'000}})
+                for (const vp::solid_options& how :
+                     {vp::solid_options{}, vp::solid_options{.repair = vp::repair::close_holes},
+                      vp::solid_options{
+                          .extent = vp::solid_extent::outer, .repair = vp::repair::close_holes, .max_hole_edges = 3},
+                      vp::solid_options{.repair = vp::repair::vote}}) {
+                    targets whole{backend, grid.extent};
+                    const vp::status one =
+                        vp::voxelize_solid(backend, mesh.view(), grid, vp::passthrough{}, winding{}, whole, how);
+                    ASSERT_TRUE(one.ok()) << one.message();
+                    const auto expected = vp::get<0>(whole).to_host_target(backend);
+                    slabs::stream_options options;
+                    options.memory = memory;
+                    options.folder = ::testing::TempDir();
+                    options.is_solid = true;
+                    options.repair = how.repair;
+                    solid_stream stream(MPI_COMM_WORLD, backend, grid, {}, options);
+                    const auto [first, last] = slabs::share_of(mesh.triangles.size(), my_rank(), num_ranks());
+                    stream
+                        .add({mesh.positions,
+                              vp::array_view<const glm::uvec3>(mesh.triangles.data() + first, last - first)})
+                        .or_throw();
+                    std::uint64_t wrong = 0, voxels = 0;
+                    const vp::status s = stream.draw_solid(
+                        winding{},
+                        [&](glm::ivec3 size) {
+                            return targets{backend, size};
+                        },
+                        [&](const slabs::slab& slab, const targets& fb) {
+                            const auto part = vp::get<0>(fb).to_host_target(backend);
+                            const glm::ivec3 o = slab.where.offset - grid.offset;
+                            unit::for_each_voxel(slab.where.extent, [&](int x, int y, int z) {
+                                wrong += part(x, y, z) != expected(o.x + x, o.y + y, o.z + z) ? 1 : 0;
+                                ++voxels;
+                            });
+                        },
+                        how);
+                    EXPECT_TRUE(s.ok()) << s.message();
+                    EXPECT_EQ(s.counts, one.counts);
+                    EXPECT_EQ(s.solid, one.solid);
+                    EXPECT_EQ(wrong, 0u);
+                    EXPECT_EQ(sum_of_ranks(voxels), static_cast<std::uint64_t>(grid.extent.x) *
+                                                        static_cast<std::uint64_t>(grid.extent.y) *
+                                                        static_cast<std::uint64_t>(grid.extent.z));
+                }
+    slabs::stream_options flood;
+    flood.repair = vp::repair::exterior;
+    solid_stream refused(MPI_COMM_WORLD, backend, uncut, {}, flood);
+    EXPECT_EQ(refused
+                  .draw_solid(
+                      winding{},
+                      [&](glm::ivec3 size) {
+                          return targets{backend, size};
+                      },
+                      [](const slabs::slab&, const targets&) { FAIL(); }, {.repair = vp::repair::exterior})
+                  .code,
+              vp::status_code::crop_without_whole);
 }
 
 TEST_P(Ranks, AFailureOfOneRankEndsTheCallOnAll) {

@@ -248,6 +248,49 @@ TEST(RepairedStream, ASlabThatRunsOutOfMemoryIsCutAgain) {
     }
 }
 
+// Voxels may be inside where no triangle is: between walls that `closing` joins, and at lids, where slabs are cut along
+// z and then along y.
+TEST(RepairedStream, SlabsThatNoTriangleReachesAreFilled) {
+    const auto add_tube = [](unit::small_mesh& m, float low, float high) {
+        for (const float x : {4.5f, 30.5f}) add_quad(m, {x, 4, low}, {x, 28, low}, {x, 28, high}, {x, 4, high});
+        for (const float y : {4.5f, 27.5f}) add_quad(m, {4, y, low}, {31, y, low}, {31, y, high}, {4, y, high});
+    };
+    unit::small_mesh gap;
+    add_tube(gap, 3, 19.5f);
+    add_tube(gap, 21.5f, 38);
+    for (const float z : {3.5f, 37.5f}) add_quad(gap, {4, 4, z}, {31, 4, z}, {31, 28, z}, {4, 28, z});
+    whole_solid flooded{gap, unit::unit_grid(extent), {.repair = vp::repair::exterior, .closing = 2}};
+    const auto all = vp::get<0>(flooded.expected).to_host_target(flooded.backend);
+    EXPECT_NE(all(17, 16, 20), 0);
+    EXPECT_EQ(flooded.expect_stream(options_for(flooded.options, 42)), 42);
+
+    unit::small_mesh tube; // along x
+    for (const float y : {4.5f, 27.5f}) add_quad(tube, {4, y, 3}, {31, y, 3}, {31, y, 38}, {4, y, 38});
+    for (const float z : {3.0f, 38.0f}) add_quad(tube, {4, 4.5f, z}, {31, 4.5f, z}, {31, 27.5f, z}, {4, 27.5f, z});
+    whole_solid lids{
+        tube, unit::unit_grid(extent), {.rule = vp::fill_rule::even_odd, .repair = vp::repair::close_holes}};
+    EXPECT_EQ(lids.one.solid.open_rows, 0u);
+    EXPECT_GT(lids.one.counts.voxels, 10'000u);
+    stream_type stream(lids.backend, lids.grid, {}, options_for(lids.options, 3));
+    feed(stream, tube);
+    std::uint64_t without = 0;
+    const vp::status s = stream.draw_solid(
+        winding{},
+        [&](glm::ivec3 size) {
+            if (size.z > 1 || size.y > 5) throw std::bad_alloc();
+            return targets{lids.backend, size};
+        },
+        [&](const slabs::slab& slab, const targets&) {
+            const glm::ivec3 o = slab.where.offset;
+            if (o.y > 6 && o.y < 20 && o.z > 6 && o.z < 30) without += slab.drawn.counts.voxels;
+        },
+        lids.options);
+    EXPECT_TRUE(s.ok()) << s.message();
+    EXPECT_EQ(s.counts, lids.one.counts);
+    EXPECT_EQ(s.solid, lids.one.solid);
+    EXPECT_GT(without, 1000u);
+}
+
 TEST(RepairedStream, WithoutTrianglesGivesClearedSlabs) {
     for (const auto kind : {vp::repair::close_holes, vp::repair::vote, vp::repair::exterior}) {
         whole_solid whole{{}, unit::unit_grid(extent), {.repair = kind}};

@@ -5,6 +5,7 @@
 #include "solid_drawings.hpp"
 
 #include <voxelpipe/slabs/columns.hpp>
+#include <voxelpipe/slabs/stream.hpp>
 
 using namespace device_test;
 
@@ -325,6 +326,51 @@ TEST(Solids, SlabsOfAnExterior) {
             all.expect_same(slab, options, loading::load);
             expect_same_lists<std::uint32_t>(broken_meshes(), id_of_fragment{5}, slab, options);
         }
+    }
+}
+
+// A stream draws its slabs, and the cover that a flood needs, on the GPU.
+TEST(Solids, StreamsWithRepairs) {
+    const mesh_data m = broken_meshes()[2];
+    const vp::grid g = box_grid({37, 26, 25});
+    for (const vp::solid_options& options :
+         {vp::solid_options{.extent = vp::solid_extent::outer, .repair = vp::repair::close_holes},
+          vp::solid_options{.repair = vp::repair::vote}, vp::solid_options{.repair = vp::repair::exterior},
+          vp::solid_options{.repair = vp::repair::exterior, .closing = 2}}) {
+        SCOPED_TRACE(static_cast<int>(options.repair));
+        vp::cpu_backend cpu;
+        vp::cuda_backend gpu;
+        bit_target<vp::cpu_backend> whole{cpu, g.extent};
+        const vp::status one = vp::voxelize_solid(cpu, vp::mesh_view<>{m.positions, m.triangles}, g, vp::passthrough{},
+                                                  vp::constant(true), whole, options);
+        ASSERT_TRUE(one.ok()) << one.message();
+        const auto expected = vp::get<0>(whole).to_host_target(cpu);
+        vp::slabs::stream_options how;
+        how.num_slabs = 4;
+        how.repair = options.repair;
+        vp::slabs::stream<vp::cuda_backend, vp::passthrough> stream(gpu, g, {}, how);
+        stream.add({m.positions, m.triangles}).or_throw();
+        int wrong = 0, num_slabs = 0;
+        const vp::status s = stream.draw_solid(
+            vp::constant(true),
+            [&](glm::ivec3 size) {
+                return bit_target<vp::cuda_backend>{gpu, size};
+            },
+            [&](const vp::slabs::slab& slab, const bit_target<vp::cuda_backend>& bits) {
+                const auto found = vp::get<0>(bits).to_host_target(gpu);
+                const glm::ivec3 e = slab.where.extent;
+                for (int z = 0; z < e.z; ++z)
+                    for (int y = 0; y < e.y; ++y)
+                        for (int x = 0; x < e.x; ++x)
+                            wrong += found(x, y, z) != expected(x, y, slab.where.offset.z + z);
+                ++num_slabs;
+            },
+            options);
+        EXPECT_TRUE(s.ok()) << s.message();
+        EXPECT_EQ(wrong, 0);
+        EXPECT_EQ(num_slabs, 4);
+        expect_same_counts(s.counts, one.counts);
+        EXPECT_EQ(s.solid, one.solid);
     }
 }
 

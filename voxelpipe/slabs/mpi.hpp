@@ -5,7 +5,7 @@
 // Voxelizes over the ranks of an MPI communicator (CMake component mpi, target voxelpipe::mpi). Each rank adds the
 // triangles that it has read, whichever they are. Then the ranks agree on slabs of about equal work, send each triangle
 // to the ranks whose slabs it reaches, and each draws its slab, as a stream does. All slabs together are the result of
-// one call, bit for bit; results stay where they are, only counters travel.
+// one call, bit for bit; results stay where they are, only counters travel, and for solids what a repair needs.
 //
 //   slabs::mpi_stream stream(MPI_COMM_WORLD, backend, grid, vertex_shader, options);
 //   stream.add(my_part_of_the_mesh).or_throw();
@@ -23,10 +23,15 @@
 #endif
 #include <mpi.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <exception>
+#include <limits>
+#include <new>
+#include <optional>
 #include <span>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -46,6 +51,7 @@ public:
         : comm_(comm), backend_(backend), grid_(g), shader_(shader), options_(std::move(options)),
           memory_(options_.memory / 4, 1, options_.folder), mine_(1) {
         if (const status s = validate(g); !s.ok()) throw std::invalid_argument("voxelpipe::slabs: " + s.message());
+        repairs_.emplace(g, options_.repair, options_.memory / 8, options_.folder, 1);
         options_.num_slabs = 1;
         counts_of_layers_ = histogram(g.extent);
         MPI_Comm_rank(comm_, &rank_);
@@ -56,11 +62,15 @@ public:
     // in which it adds them. As stream::add; draw() fails on every rank if it failed on one.
     [[nodiscard]] status add(const Mesh& chunk) {
         counters added;
-        status s = for_each_record<varyings>(chunk, shader_, grid_, options_.voxelize.rule, options_.is_solid,
-                                             num_triangles_, added, [&](const record_type& r, const auto& reach) {
-                                                 counts_of_layers_.add(reach);
-                                                 memory_.push(mine_, 0, r);
-                                             });
+        const chunk_records<varyings, Mesh> records(chunk, shader_, grid_, options_.binning(), num_triangles_);
+        status s = records.valid();
+        if (s.ok() && repairs_->needs_triangles())
+            records.visit_snapped([&](const auto& a, const auto& b, const auto& c) { repairs_->add(a, b, c); });
+        if (s.ok())
+            s = records.visit(0, chunk.triangles.size(), added, [&](const record_type& r, const auto& reach) {
+                counts_of_layers_.add(reach);
+                memory_.push(mine_, 0, r);
+            });
         core::add_triangles(counts_, added);
         if (s.ok())
             num_triangles_ += chunk.part.whole != 0 ? chunk.part.whole : chunk.triangles.size();
@@ -76,13 +86,16 @@ public:
     template <class FragmentShader, class Make, class Sink>
     [[nodiscard]] status draw(const FragmentShader& shader, const Make& make, const Sink& sink) {
         constexpr bool lists = detail::is_abuffer<std::remove_cvref_t<decltype(make(grid_.extent))>>;
-        return draw_with(!lists, [&](auto& stream) { return stream.draw(shader, make, sink); });
+        return draw_with(!lists, nullptr, [&](auto& stream) { return stream.draw(shader, make, sink); });
     }
-    // Every rank. As stream::draw_solid.
+    // Every rank. As stream::draw_solid, with close_holes and vote; exterior is refused (crop_without_whole). On top of
+    // what that holds, every rank holds the edges that the triangles of each rank leave open, 56 bytes each: those of
+    // the holes, and of the borders between what the ranks have read.
     template <class SolidShader, class Make, class Sink>
     [[nodiscard]] status draw_solid(const SolidShader& shader, const Make& make, const Sink& sink,
                                     const solid_options& how = {}) {
-        return draw_with(false, [&](auto& stream) { return stream.draw_solid(shader, make, sink, how); });
+        if (how.repair == repair::exterior) return core::failure(status_code::crop_without_whole);
+        return draw_with(false, &how, [&](auto& stream) { return stream.draw_solid(shader, make, sink, how); });
     }
 
     // After draw(): the slabs, by rank.
@@ -95,8 +108,9 @@ public:
     [[nodiscard]] list_offset lists_before() const { return before_; }
 
 private:
+    // solid: its options, or null.
     template <class Draw>
-    [[nodiscard]] status draw_with(bool may_turn, const Draw& draw) {
+    [[nodiscard]] status draw_with(bool may_turn, const solid_options* solid, const Draw& draw) {
         status own = failed_;
         std::exception_ptr thrown;
         // Runs work() on this rank; whatever goes wrong is kept until all ranks know.
@@ -131,6 +145,10 @@ private:
         std::vector<bin<record_type>> received(static_cast<std::size_t>(num_ranks_));
         exchange(static_cast<std::uint32_t>(base), received, attempt);
         if (!all_ok()) return finish(own, thrown);
+        core::hole_cones cones;
+        if (solid != nullptr && repairs_->holes()) join_holes(cones, solid->max_hole_edges, own, attempt);
+        if (solid != nullptr && repairs_->columns()) join_columns(received, attempt, all_ok);
+        if (!all_ok()) return finish(own, thrown);
 
         status drawn;
         attempt([&] {
@@ -139,6 +157,13 @@ private:
                                                     options_);
             if (plan_.axis != 2) stream.cut_into(equal_layers(stream.where(), plan_.axis, 1));
             feed(stream, received);
+            if (stream.repairs().holes()) stream.repairs().take(std::move(cones), grid_);
+            if (stream.repairs().columns()) {
+                column_sweep &from = *repairs_->columns(), &to = *stream.repairs().columns();
+                std::copy(from.open().begin(), from.open().end(), to.open().begin());
+                std::copy(from.below().begin(), from.below().end(), to.below().begin());
+            }
+            repairs_.reset();
             drawn = draw(stream);
             if (!drawn.ok()) own = drawn;
         });
@@ -180,9 +205,7 @@ private:
             }
             // No rank sends unless all have room.
             attempt([&] { in.resize(arrive); });
-            int has_room = in.size() == arrive ? 1 : 0;
-            MPI_Allreduce(MPI_IN_PLACE, &has_room, 1, MPI_INT, MPI_MIN, comm_);
-            if (has_room == 0) return false;
+            if (!have_all(in.size() == arrive)) return false;
             MPI_Alltoallv(out.data(), sent.data(), out_at.data(), type, in.data(), coming.data(), in_at.data(), type,
                           comm_);
             attempt([&] {
@@ -215,6 +238,88 @@ private:
         MPI_Type_free(&type);
     }
 
+    // The cones of the whole mesh, in the grid's numbers, from the edges that are left on each rank. Every rank.
+    template <class Attempt>
+    void join_holes(core::hole_cones& cones, std::uint64_t max_hole_edges, status& own, const Attempt& attempt) {
+        using edge = hole_finder::edge;
+        const auto n = static_cast<std::size_t>(num_ranks_);
+        std::vector<edge> mine, all;
+        attempt([&] { mine = repairs_->holes()->take_edges(); });
+        repairs_->holes().reset();
+        std::vector<std::uint64_t> sizes(n);
+        const std::uint64_t size = mine.size();
+        MPI_Allgather(&size, 1, MPI_UINT64_T, sizes.data(), 1, MPI_UINT64_T, comm_);
+        std::vector<int> counts(n), firsts(n);
+        std::uint64_t sum = 0;
+        for (std::size_t r = 0; r < n; ++r) {
+            firsts[r] = static_cast<int>(sum);
+            counts[r] = static_cast<int>(sizes[r]);
+            sum += sizes[r];
+        }
+        attempt([&] {
+            if (sum > std::numeric_limits<int>::max()) throw std::bad_alloc(); // MPI counts by int
+            all.resize(static_cast<std::size_t>(sum));
+        });
+        if (!have_all(all.size() == sum)) return;
+        MPI_Datatype type;
+        MPI_Type_contiguous(static_cast<int>(sizeof(edge)), MPI_BYTE, &type);
+        MPI_Type_commit(&type);
+        MPI_Allgatherv(mine.data(), static_cast<int>(size), type, all.data(), counts.data(), firsts.data(), type,
+                       comm_);
+        MPI_Type_free(&type);
+        mine = {};
+        attempt([&] {
+            hole_finder::cancel(all);
+            try {
+                cones = hole_finder::close(all, max_hole_edges);
+            } catch (const std::length_error&) {
+                own = core::failure(status_code::too_many_triangles, stage::coarse_raster);
+            }
+        });
+    }
+
+    // The columns of this rank's slab: those of all triangles, less what crosses them in the slabs of the ranks below.
+    // Every rank.
+    template <class Attempt, class AllOk>
+    void join_columns(const std::vector<bin<record_type>>& received, const Attempt& attempt, const AllOk& all_ok) {
+        std::optional<column_sweep> mine; // of the slab alone
+        attempt([&] {
+            mine.emplace(grid_);
+            const core::snap_transform snap = core::make_snap_transform(grid_);
+            mine->begin(plan_.slabs[static_cast<std::size_t>(rank_)]);
+            for (const bin<record_type>& from : received)
+                from.for_each_block([&](std::span<const record_type> block) {
+                    for (const record_type& r : block) {
+                        const auto at = [&](int k) {
+                            return core::snap(snap, r.positions[k].x, r.positions[k].y, r.positions[k].z);
+                        };
+                        mine->pass(at(0), at(1), at(2));
+                    }
+                });
+            mine->end();
+        });
+        if (!all_ok()) return;
+        column_sweep& all = *repairs_->columns();
+        const std::span<std::uint64_t> slab = mine->below(), below = all.below();
+        for_each_part(all.open(), [&](std::uint64_t* words, int count) {
+            MPI_Allreduce(MPI_IN_PLACE, words, count, MPI_UINT64_T, MPI_BXOR, comm_);
+        });
+        for_each_part(below, [&](std::uint64_t* words, int count) {
+            MPI_Allreduce(MPI_IN_PLACE, words, count, MPI_UINT64_T, MPI_BXOR, comm_);
+        });
+        for_each_part(slab, [&](std::uint64_t* words, int count) {
+            MPI_Exscan(MPI_IN_PLACE, words, count, MPI_UINT64_T, MPI_BXOR, comm_);
+        });
+        if (rank_ != 0) // where MPI leaves it undefined
+            for (std::size_t i = 0; i < below.size(); ++i) below[i] ^= slab[i];
+    }
+    template <class F>
+    static void for_each_part(std::span<std::uint64_t> words, const F& f) {
+        constexpr std::size_t most = std::size_t{1} << 30; // MPI counts by int
+        for (std::size_t first = 0; first < words.size(); first += most)
+            f(words.data() + first, static_cast<int>(std::min(most, words.size() - first)));
+    }
+
     template <class Stream>
     void feed(Stream& stream, std::vector<bin<record_type>>& received) const {
         const core::snap_transform snap = core::make_snap_transform(stream.where());
@@ -230,16 +335,18 @@ private:
 
     [[nodiscard]] core::voxel_box reach_of(const core::snap_transform& snap, const glm::ivec3& extent,
                                            const record_type& r) const {
-        return classify(snap, extent, options_.voxelize.rule, r.positions[0], r.positions[1], r.positions[2],
-                        options_.is_solid)
-            .reach;
+        return options_.binning()(snap, extent, r.positions).reach;
     }
 
+    // True if it is true on every rank. Every rank.
+    [[nodiscard]] bool have_all(bool has) const {
+        int all = has ? 1 : 0;
+        MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPI_INT, MPI_MIN, comm_);
+        return all != 0;
+    }
     // True if no rank has failed. Every rank.
     [[nodiscard]] bool agree(const status& own, const std::exception_ptr& thrown) const {
-        int failed = !own.ok() || thrown ? 1 : 0;
-        MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, comm_);
-        return failed == 0;
+        return have_all(own.ok() && !thrown);
     }
     [[nodiscard]] static status finish(const status& own, const std::exception_ptr& thrown) {
         if (thrown) std::rethrow_exception(thrown);
@@ -264,8 +371,14 @@ private:
         all.counts = {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], sums[8]};
         all.solid.open_rows = sums[9];
         all.solid.crossings = sums[10];
-        all.solid.max_winding = drawn.solid.max_winding;
-        MPI_Allreduce(MPI_IN_PLACE, &all.solid.max_winding, 1, MPI_UINT64_T, MPI_MAX, comm_);
+        // Holes are those of the whole mesh on every rank that has a slab.
+        std::array<std::uint64_t, 4> most{drawn.solid.max_winding, drawn.solid.hole_edges, drawn.solid.holes,
+                                          drawn.solid.cones};
+        MPI_Allreduce(MPI_IN_PLACE, most.data(), static_cast<int>(most.size()), MPI_UINT64_T, MPI_MAX, comm_);
+        all.solid.max_winding = most[0];
+        all.solid.hole_edges = most[1];
+        all.solid.holes = most[2];
+        all.solid.cones = most[3];
         return all;
     }
     MPI_Comm comm_;
@@ -276,6 +389,7 @@ private:
     bin_memory<record_type> memory_;
     std::vector<bin<record_type>> mine_; // one
     histogram counts_of_layers_;
+    std::optional<solid_repairs> repairs_; // of this rank's triangles, until they are drawn
     counters counts_;
     status failed_;
     std::uint64_t num_triangles_ = 0;

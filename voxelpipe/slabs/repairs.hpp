@@ -56,7 +56,7 @@ public:
     [[nodiscard]] status begin(const solid_options& how) {
         if (holes_) {
             try {
-                take(holes_->finish(how.max_hole_edges));
+                take(holes_->finish(how.max_hole_edges), grid_);
             } catch (const std::length_error&) {
                 return core::failure(status_code::too_many_triangles, stage::coarse_raster);
             }
@@ -109,12 +109,13 @@ public:
 
     // The search for holes; none once it has ended.
     [[nodiscard]] std::optional<hole_finder>& holes() { return holes_; }
-    // Cones from elsewhere, of a mesh that is snapped in the grid.
-    void take(core::hole_cones&& cones) {
+    // The cones of the whole mesh, whose triangles were snapped in `where`: this grid, or one that it is a crop of.
+    void take(core::hole_cones&& cones, const grid& where) {
         holes_.reset();
-        const core::snap_transform snap = core::make_snap_transform(grid_);
+        const core::snap_transform snap = core::make_snap_transform(where);
         cones_ = core::moved(std::move(cones), {-snap.offset[0], -snap.offset[1], -snap.offset[2]});
     }
+    // The columns of a vote; of this grid from its lowest layer on, until enter().
     [[nodiscard]] std::optional<column_sweep>& columns() { return columns_; }
 
 private:

@@ -75,9 +75,7 @@ corner_record<Varyings> record_of(const triangle_stream::block& from, std::size_
 class corner_placer {
 public:
     corner_placer(const voxelize_request& request, const triangle_stream& model)
-        : rule_(request.solid ? voxelpipe::coverage::conservative : request.coverage),
-          is_solid_(request.solid && request.solid->rule != solid_rule::exterior),
-          votes_(request.solid && request.solid->vote) {
+        : how_{request.coverage, request.solid.has_value(), repair_of(request)} {
         for (const triangle_stream::part& p : model.parts())
             places_.emplace_back(p.to_world, reference_point(request.grid));
         grid_ = request.grid;
@@ -86,18 +84,21 @@ public:
     }
     [[nodiscard]] slabs::classified operator()(std::size_t part, const glm::vec3* corners) const {
         const placed_vertex_shader& place = places_[part];
-        if (votes_)
-            return slabs::classify_for_vote(snap_, grid_.extent, place(corners[0]), place(corners[1]),
-                                            place(corners[2]));
-        return slabs::classify(snap_, grid_.extent, rule_, place(corners[0]), place(corners[1]), place(corners[2]),
-                               is_solid_);
+        const glm::vec3 placed[3] = {place(corners[0]), place(corners[1]), place(corners[2])};
+        slabs::classified c = how_(snap_, grid_.extent, placed);
+        if (c.reach.empty() && c.kind == vp::core::triangle_class::drawn) c.kind = vp::core::triangle_class::outside;
+        return c;
     }
 
 private:
+    [[nodiscard]] static vp::repair repair_of(const voxelize_request& request) {
+        if (!request.solid) return vp::repair::none;
+        if (request.solid->rule == solid_rule::exterior) return vp::repair::exterior;
+        return request.solid->vote ? vp::repair::vote : vp::repair::none; // lids lie where the triangles do
+    }
+
     std::vector<placed_vertex_shader> places_; // by part
-    voxelpipe::coverage rule_;
-    bool is_solid_; // by rows: triangles beside the grid along x count too
-    bool votes_;
+    slabs::binning how_;
     voxelpipe::grid grid_;
     vp::core::snap_transform snap_{};
 };
