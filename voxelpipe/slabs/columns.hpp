@@ -114,6 +114,7 @@ private:
 // triangles tell what lies below the next one.
 class column_sweep {
 public:
+    // Of a grid, or of a crop of one: its columns begin at its lowest layer.
     explicit column_sweep(const grid& g)
         : columns_(g), open_(columns_.words()), below_(columns_.words()), next_(columns_.words()) {}
     // Bytes that the bits of a grid take.
@@ -129,11 +130,12 @@ public:
         });
     }
 
-    // Once all triangles are there: the next slab. All triangles that reach its layers follow.
+    // Once all triangles are there: the next slab, whose triangles are to be passed.
     void begin(const layer_range& slab) {
         slab_ = slab;
         next_ = below_;
     }
+    // A triangle that reaches the slab's layers; each once.
     void pass(const core::snapped_position& a, const core::snapped_position& b, const core::snapped_position& c) {
         columns_.for_each(a, b, c, [&](std::size_t word, std::uint64_t bit, std::int64_t above) {
             if (above > slab_.begin && above <= slab_.end) next_[word] ^= bit;
@@ -149,8 +151,9 @@ public:
     // Goes on to the layers behind the slab. Without this, begin() takes another slab with the same first layer.
     void end() { below_.swap(next_); }
 
-    // Both layers of bits, for sums over several sweeps of one grid, to each of which some of the triangles were added.
+    // The columns that are open. An exclusive or joins those of several sweeps that share the triangles.
     [[nodiscard]] std::span<std::uint64_t> open() { return open_; }
+    // What lies below the next slab; joined in the same way.
     [[nodiscard]] std::span<std::uint64_t> below() { return below_; }
 
 private:

@@ -285,17 +285,10 @@ private:
         std::optional<column_sweep> mine; // of the slab alone
         attempt([&] {
             mine.emplace(grid_);
-            const core::snap_transform snap = core::make_snap_transform(grid_);
             mine->begin(plan_.slabs[static_cast<std::size_t>(rank_)]);
             for (const bin<record_type>& from : received)
-                from.for_each_block([&](std::span<const record_type> block) {
-                    for (const record_type& r : block) {
-                        const auto at = [&](int k) {
-                            return core::snap(snap, r.positions[k].x, r.positions[k].y, r.positions[k].z);
-                        };
-                        mine->pass(at(0), at(1), at(2));
-                    }
-                });
+                detail::for_each_snapped(from, grid_,
+                                         [&](const auto& a, const auto& b, const auto& c) { mine->pass(a, b, c); });
             mine->end();
         });
         if (!all_ok()) return;

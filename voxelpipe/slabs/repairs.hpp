@@ -17,16 +17,37 @@
 #include <voxelpipe/slabs/exterior.hpp>
 #include <voxelpipe/slabs/holes.hpp>
 #include <voxelpipe/slabs/plan.hpp>
+#include <voxelpipe/slabs/records.hpp>
 #include <voxelpipe/solid.hpp>
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace voxelpipe::slabs {
+
+namespace detail {
+
+// Calls visit(a, b, c) for the corners of all triangles, snapped in a grid.
+template <class Varyings, class Visit>
+void for_each_snapped(const bin<record<Varyings>>& triangles, const grid& g, const Visit& visit) {
+    const core::snap_transform snap = core::make_snap_transform(g);
+    triangles.for_each_block([&](std::span<const record<Varyings>> block) {
+        for (const record<Varyings>& r : block) {
+            const auto at = [&](int k) {
+                const glm::vec3& p = r.positions[k];
+                return core::snap(snap, p.x, p.y, p.z);
+            };
+            visit(at(0), at(1), at(2));
+        }
+    });
+}
+
+} // namespace detail
 
 // The repair of one body. Members throw std::bad_alloc, and std::system_error of files.
 class solid_repairs {
@@ -69,15 +90,17 @@ public:
     // All walls are there.
     void flood() { exterior_->flood(); }
 
-    // The next slab of a vote, with all triangles that reach it: for_each(visit) calls visit(a, b, c) with each,
-    // snapped in the grid. One that begins where the last one did takes its place, unless leave() came in between.
-    template <class ForEach>
-    void enter(const grid& slab, const ForEach& for_each) {
+    // The next slab of a vote, with all triangles that reach it. One that begins where the last one did takes its
+    // place, unless leave() came in between.
+    template <class Varyings>
+    void enter(const grid& slab, const bin<record<Varyings>>& triangles) {
         if (!columns_) return;
         const int first = slab.offset.z - grid_.offset.z;
         columns_->begin({first, first + slab.extent.z});
-        for_each([&](const auto& a, const auto& b, const auto& c) { columns_->pass(a, b, c); });
+        detail::for_each_snapped(triangles, grid_,
+                                 [&](const auto& a, const auto& b, const auto& c) { columns_->pass(a, b, c); });
     }
+    // The slab has been drawn.
     void leave() {
         if (columns_) columns_->end();
     }

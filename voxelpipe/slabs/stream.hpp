@@ -29,6 +29,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <new>
 #include <stdexcept>
 #include <thread>
 #include <type_traits>
@@ -150,9 +151,13 @@ public:
         if (const status s = core::validate(how, grid_); !s.ok()) return s;
         if (repairs_.is_along_z() && !core::takes_solid_slabs<Backend>)
             return core::failure(status_code::strategy_unavailable);
-        if (const status s = repairs_.begin(how); !s.ok()) return s;
-        // The flood has an eighth of the memory.
-        return draw_slabs<true>(shader, make, sink, how, repairs_.needs_walls() ? 0.625 : 0.75);
+        try {
+            if (const status s = repairs_.begin(how); !s.ok()) return s;
+            // The flood has an eighth of the memory.
+            return draw_slabs<true>(shader, make, sink, how, repairs_.needs_walls() ? 0.625 : 0.75);
+        } catch (const std::bad_alloc&) {
+            return core::failure(status_code::out_of_memory, stage::coarse_raster);
+        }
     }
 
 private:
@@ -191,7 +196,7 @@ private:
                 part.fragments_before = all.counts.fragments;
                 output out = make(part.where.extent);
                 if constexpr (IsSolid) {
-                    enter(next);
+                    repairs_.enter(next.where, next.triangles);
                     if (triangles.numbers.size() == 0 && repairs_.fills_without_triangles())
                         triangles = arrays::dropped();
                     const solid_options of_slab = repairs_.of(part.where, how);
@@ -222,21 +227,6 @@ private:
         return all;
     }
 
-    // Shows the repair the triangles of a slab.
-    void enter(const typename queue_type::entry& next) {
-        const core::snap_transform snap = core::make_snap_transform(grid_);
-        repairs_.enter(next.where, [&](const auto& visit) {
-            next.triangles.for_each_block([&](std::span<const record_type> block) {
-                for (const record_type& r : block) {
-                    const auto at = [&](int i) {
-                        const glm::vec3& p = r.positions[i];
-                        return core::snap(snap, p.x, p.y, p.z);
-                    };
-                    visit(at(0), at(1), at(2));
-                }
-            });
-        });
-    }
     // Draws the cover of all slabs, for the flood.
     [[nodiscard]] status find_outside(queue_type& queue, double share) {
         using cover = sparse_framebuffer<Backend, target<bit, blend::bit_or>>;
