@@ -140,12 +140,11 @@ struct left_triangles {
     unsigned kinds[5]; // by triangle_class
 };
 
-// The first of two kernels: appends the pairs of small triangles, several of a thread's at a time, and records the
-// large ones.
+// Appends the pairs of small triangles, several of a thread's at a time, and records the large ones. All threads of the
+// block call it.
 template <coverage Rule>
-__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void append_small_kernel(
-    const __grid_constant__ geometry geo, const __grid_constant__ tile_cells<Rule> op,
-    const __grid_constant__ cell_buffers b, pipeline_state* state, const __grid_constant__ capacities limits) {
+__device__ VOXELPIPE_INLINE void append_small(const geometry& geo, const tile_cells<Rule>& op, const cell_buffers& b,
+                                              pipeline_state* state, const capacities& limits) {
     using core::triangle_class;
     constexpr unsigned each = left_triangles::each;
     __shared__ left_triangles left;
@@ -221,11 +220,10 @@ __global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) v
     }
 }
 
-// The second: a warp takes room for the pairs of a record.
+// Appends the pairs of the large triangles: a warp takes room for those of a record.
 template <coverage Rule>
-__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void append_large_kernel(
-    const __grid_constant__ geometry geo, const __grid_constant__ tile_cells<Rule> op,
-    const __grid_constant__ cell_buffers b, pipeline_state* state, const __grid_constant__ capacities limits) {
+__device__ VOXELPIPE_INLINE void append_large(const geometry& geo, const tile_cells<Rule>& op, const cell_buffers& b,
+                                              const pipeline_state* state, const capacities& limits) {
     if (state->index_error != 0) return;
     for_each_record(geo, op, b,
                     [&](std::uint32_t id, const loaded_triangle& t, bool valid, const core::voxel_box& box) {
@@ -238,6 +236,19 @@ __global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) v
                         if (n != 0 && first + before <= limits.tile_pairs)
                             op.emit(geo, t, id, box, false, first + before - n);
                     });
+}
+
+// As in count_and_emit, a kernel is both passes, which share most of their code.
+enum class append_pass { small, large };
+template <coverage Rule>
+__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void append_kernel(
+    const __grid_constant__ geometry geo, const __grid_constant__ tile_cells<Rule> op,
+    const __grid_constant__ cell_buffers b, pipeline_state* state, const __grid_constant__ capacities limits,
+    append_pass pass) {
+    if (pass == append_pass::small)
+        append_small(geo, op, b, state, limits);
+    else
+        append_large(geo, op, b, state, limits);
 }
 
 } // namespace voxelpipe::device

@@ -65,10 +65,10 @@ tile_work coarse_pass(const geometry& geo, const tile_memory& m, pipeline_state*
     const tile_cells<Rule> op{m.tiles, m.keys[0], m.primitives[0]};
     const auto blocks =
         static_cast<unsigned>((std::uint64_t{geo.num_primitives} + left_triangles::max - 1) / left_triangles::max);
-    append_small_kernel<Rule><<<blocks, threads_per_block, 0, stream>>>(geo, op, cells, state, limits);
+    append_kernel<Rule><<<blocks, threads_per_block, 0, stream>>>(geo, op, cells, state, limits, append_pass::small);
     check(cudaGetLastError(), stage::coarse_raster);
-    append_large_kernel<Rule>
-        <<<fill_device(cells.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, cells, state, limits);
+    append_kernel<Rule><<<fill_device(cells.record_capacity * 32), threads_per_block, 0, stream>>>(
+        geo, op, cells, state, limits, append_pass::large);
     check(cudaGetLastError(), stage::coarse_raster);
     end_stage(clock, &stage_times::coarse_raster);
     fill_end(m.keys[0], m.primitives[0], cells.num_cells, limits.tile_pairs, state, limits, stream);
