@@ -248,62 +248,46 @@ concept stores_cells = requires {
     &Op::emit;
 };
 
-// A kernel is both passes over its triangles: what finds their cells, most of its code, is compiled once for the two.
-enum class cell_pass { count, emit };
+// One kernel for all passes: what finds a triangle's cells, most of the code, is compiled once.
+enum class cell_pass { count_small, count_large, emit_small, emit_large };
 template <class Op>
-__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void small_cells_kernel(
+__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void cells_kernel(
     const __grid_constant__ geometry geo, const __grid_constant__ Op op, const __grid_constant__ cell_buffers b,
     pipeline_state* state, const __grid_constant__ capacities limits, cell_pass pass) {
-    if (pass == cell_pass::count)
+    if (pass == cell_pass::count_small) {
         count_small(geo, op, b, state);
-    else if constexpr (stores_cells<Op>)
-        emit_small(geo, op, b, state, limits);
-}
-template <class Op>
-__global__ __launch_bounds__(threads_per_block, tuning::count_emit_min_blocks) void large_cells_kernel(
-    const __grid_constant__ geometry geo, const __grid_constant__ Op op, const __grid_constant__ cell_buffers b,
-    pipeline_state* state, const __grid_constant__ capacities limits, cell_pass pass) {
-    if (pass == cell_pass::count)
+    } else if (pass == cell_pass::count_large) {
         count_large(geo, op, b, state);
-    else if constexpr (stores_cells<Op>)
-        emit_large(geo, op, b, state, limits);
+    } else if constexpr (stores_cells<Op>) {
+        if (pass == cell_pass::emit_small)
+            emit_small(geo, op, b, state, limits);
+        else
+            emit_large(geo, op, b, state, limits);
+    }
 }
-
-// Counts the cells of the large primitives, then computes the offsets of all.
 template <class Op>
-void count_large_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipeline_state* state,
-                       void* scan_storage, std::size_t scan_bytes, stage where, cudaStream_t stream) {
-    large_cells_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(
-        geo, op, b, state, capacities{}, cell_pass::count);
+void launch_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipeline_state* state,
+                  const capacities& limits, cell_pass pass, stage where, cudaStream_t stream) {
+    const bool are_small = pass == cell_pass::count_small || pass == cell_pass::emit_small;
+    const auto blocks = are_small ? num_blocks(geo.num_primitives) : fill_device(b.record_capacity * 32);
+    cells_kernel<<<blocks, threads_per_block, 0, stream>>>(geo, op, b, state, limits, pass);
     check(cudaGetLastError(), where);
-    sum_counts(b.counts, b.offsets, geo.num_primitives, scan_storage, scan_bytes, where, stream);
 }
 
 // Counts the cells of every primitive and computes their offsets.
 template <class Op>
 void count_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipeline_state* state, void* scan_storage,
                  std::size_t scan_bytes, stage where, cudaStream_t stream) {
-    small_cells_kernel<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(
-        geo, op, b, state, capacities{}, cell_pass::count);
-    check(cudaGetLastError(), where);
-    count_large_cells(geo, op, b, state, scan_storage, scan_bytes, where, stream);
-}
-
-template <class Op>
-void emit_large_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipeline_state* state,
-                      const capacities& limits, stage where, cudaStream_t stream) {
-    large_cells_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(geo, op, b, state, limits,
-                                                                                              cell_pass::emit);
-    check(cudaGetLastError(), where);
+    launch_cells(geo, op, b, state, capacities{}, cell_pass::count_small, where, stream);
+    launch_cells(geo, op, b, state, capacities{}, cell_pass::count_large, where, stream);
+    sum_counts(b.counts, b.offsets, geo.num_primitives, scan_storage, scan_bytes, where, stream);
 }
 
 template <class Op>
 void emit_cells(const geometry& geo, const Op& op, const cell_buffers& b, pipeline_state* state,
                 const capacities& limits, stage where, cudaStream_t stream) {
-    small_cells_kernel<<<num_blocks(geo.num_primitives), threads_per_block, 0, stream>>>(geo, op, b, state, limits,
-                                                                                         cell_pass::emit);
-    check(cudaGetLastError(), where);
-    emit_large_cells(geo, op, b, state, limits, where, stream);
+    launch_cells(geo, op, b, state, limits, cell_pass::emit_small, where, stream);
+    launch_cells(geo, op, b, state, limits, cell_pass::emit_large, where, stream);
 }
 
 } // namespace voxelpipe::device

@@ -67,8 +67,9 @@ struct cover_cells {
     glm::ivec3 extent;
 
     [[nodiscard]] __device__ static core::voxel_box cells(const core::voxel_box& reach) { return reach; }
-    [[nodiscard]] __device__ cell_counts count(const geometry& geo, const loaded_triangle& t, std::uint32_t,
-                                               const core::voxel_box& box, bool) const {
+    // Out of line: two passes of cells_kernel call it.
+    [[nodiscard]] __device__ __noinline__ cell_counts count(const geometry& geo, const loaded_triangle& t,
+                                                            std::uint32_t, const core::voxel_box& box, bool) const {
         const int fraction = geo.snap.fraction;
         constexpr auto spans = core::to_rule(Rule);
         const auto set = [&](int axis, int u, int v, int w0, int w1) {
@@ -165,12 +166,8 @@ void raster_cover(const cover_memory& m, const draw_geometry& of_draw, std::uint
     b.num_cells = &m.state->list_fragments;
     check(cudaMemsetAsync(b.num_records, 0, sizeof(*b.num_records), stream), stage::fine_raster);
     const cover_cells<coverage::conservative> op{m.mask, g.extent};
-    small_cells_kernel<<<num_blocks(num_triangles), threads_per_block, 0, stream>>>(one, op, b, m.state, capacities{},
-                                                                                    cell_pass::count);
-    check(cudaGetLastError(), stage::fine_raster);
-    large_cells_kernel<<<fill_device(b.record_capacity * 32), threads_per_block, 0, stream>>>(
-        one, op, b, m.state, capacities{}, cell_pass::count);
-    check(cudaGetLastError(), stage::fine_raster);
+    for (const cell_pass pass : {cell_pass::count_small, cell_pass::count_large})
+        launch_cells(one, op, b, m.state, capacities{}, pass, stage::fine_raster, stream);
     note_records_kernel<pipeline_state><<<1, 1, 0, stream>>>(m.state, state);
     check(cudaGetLastError(), stage::fine_raster);
 }
