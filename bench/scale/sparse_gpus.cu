@@ -29,7 +29,7 @@ namespace slabs = voxelpipe::slabs;
 using namespace bench;
 
 struct options : gpu::run_options {
-    int largest_mean = 1024, largest_async = 16384, repeat_gpu = 0;
+    int largest_mean = 1024, largest_async = 16384, repeat_gpu = 0, align = 8;
     std::uint64_t largest_compared = std::uint64_t{1} << 30; // bytes
 };
 
@@ -90,7 +90,7 @@ class cell {
 public:
     cell(const options& how, slabs::devices& gpus, const mesh_data& data, const vp::grid& g)
         : how_(how), gpus_(gpus), drawn_(gpus, g, vp::mesh_view<>{data.positions, data.triangles},
-                                         typename Kind::vertex_shader{}, options_of_slabs(g)),
+                                         typename Kind::vertex_shader{}, options_of_slabs()),
           results_(drawn_.size()) {}
 
     [[nodiscard]] measured run(expected<Kind>& one, bool is_one) {
@@ -141,9 +141,9 @@ public:
     }
 
 private:
-    [[nodiscard]] static slabs::device_options options_of_slabs(const vp::grid& g) {
+    [[nodiscard]] slabs::device_options options_of_slabs() const {
         slabs::device_options o;
-        o.align = g.extent.x > 2048 ? 128 : 8; // whole nodes of the index, where it has any
+        o.align = how_.align;
         o.voxelize.count_voxels = false;
         return o;
     }
@@ -283,6 +283,7 @@ int main(int argc, char** argv) {
     line.add("--largest-mean", how.largest_mean, "Largest grid of the mean");
     line.add("--largest-async", how.largest_async, "Largest grid of calls that do not wait");
     line.add("--largest-compared", how.largest_compared, "Bytes of the largest result that is compared");
+    line.add("--align", how.align, "Slabs begin at multiples of so many voxels");
     line.add("--repeat-gpu", how.repeat_gpu, "Draw on the first GPU alone, as so many; 0: on all GPUs");
     return line.run(argc, argv, [&](const std::string& command) { return run(how, command); });
 }

@@ -171,6 +171,91 @@ TEST(DeviceSparse, ConstantShadersGiveTheBytesOfTheCpu) {
     }
 }
 
+// Nodes of 128^3 and groups of 2048^3 voxels, which parts of a grid cut anywhere: around a corner of eight of each, on
+// bricks and within them, beginning or ending on the corner; then slabs of several GPUs, which are cut the same way.
+TEST(DeviceSparse, PartsThatCutNodesGiveTheBytesOfTheCpu) {
+    using bits = vp::target<vp::bit, blend::bit_or>;
+    for (const int side : {4096, 65536, 1 << 17}) {
+        SCOPED_TRACE(side);
+        const vp::grid whole = unit::unit_grid({side, side, side});
+        const glm::ivec3 corner{side / 2, 2048, side - 2048};
+        unit::small_mesh mesh = unit::make_mesh(61, 25, {40, 40, 40});
+        const unit::small_mesh large = unit::make_mesh(62, 3, {300, 30, 30});
+        for (const glm::uvec3& t : large.triangles)
+            mesh.triangles.push_back(t + static_cast<unsigned>(mesh.positions.size()));
+        mesh.positions.insert(mesh.positions.end(), large.positions.begin(), large.positions.end());
+        for (glm::vec3& p : mesh.positions) p += glm::vec3(corner - 20);
+        struct {
+            glm::ivec3 begin, extent; // from the corner on
+        } const parts[]{{{-17, -13, -9}, {40, 31, 23}},
+                        {{-24, -8, -16}, {40, 24, 48}},
+                        {{-16, 0, -8}, {33, 17, 14}},
+                        {{-128, -128, -128}, {200, 131, 137}},
+                        {{3, -20, 0}, {37, 20, 19}}};
+        for (const auto& part : parts) {
+            const vp::grid g = whole.crop(corner + part.begin, part.extent);
+            constant_pair p(g.extent);
+            p.draw({mesh}, g, vp::coverage::conservative, "a part", constant_shader);
+            EXPECT_GT(p.on_host.num_voxels(), 100u);
+        }
+        vp::cpu_backend host{2};
+        const vp::mesh<vp::cpu_backend> on_host{host, mesh.positions, mesh.triangles};
+        vp::sparse_framebuffer<vp::cpu_backend, bits> expected{host, whole.extent};
+        const vp::status b = vp::voxelize(host, on_host, whole, vp::passthrough{}, vp::constant(true), expected);
+        for (const int align : {1, 8, 128}) {
+            vp::slabs::devices gpus({0, 0, 0}, false);
+            vp::slabs::device_options options;
+            options.align = align;
+            vp::slabs::device_slabs slabs(gpus, whole, mesh.view(), vp::passthrough{}, options);
+            auto parts_of = slabs.make([](vp::cuda_backend& gpu, glm::ivec3 part) {
+                return vp::sparse_framebuffer<vp::cuda_backend, bits>{gpu, part};
+            });
+            EXPECT_GT(parts_of.size(), 1u);
+            const vp::status a = slabs.draw(vp::constant(true), parts_of);
+            ASSERT_TRUE(a.ok() && b.ok()) << a.message() << "; " << b.message();
+            EXPECT_EQ(a.counts, b.counts);
+            std::vector<vp::host_sparse<bits>> on_gpus;
+            for (std::size_t i = 0; i < parts_of.size(); ++i) on_gpus.push_back(parts_of[i].to_host(gpus.backend(i)));
+            EXPECT_TRUE(
+                vp::same_contents(vp::merge(std::span<const vp::host_sparse<bits>>(on_gpus)), expected.to_host(host)));
+        }
+    }
+}
+
+// A node is marked because of a triangle beside the part of the grid, and has no brick.
+TEST(DeviceSparse, NodesWithoutBricksLeaveNothing) {
+    const vp::grid whole = unit::unit_grid({4096, 4096, 4096});
+    const vp::grid g = whole.crop({2056, 2056, 2056}, {16, 19, 24});
+    unit::small_mesh mesh = unit::make_mesh(63, 9, {30, 30, 30});
+    for (glm::vec3& p : mesh.positions) p += glm::vec3(2100);
+    constant_pair p(g.extent);
+    p.draw({mesh}, g, vp::coverage::conservative, "beside the part", constant_shader);
+    EXPECT_EQ(p.on_device.num_bricks(), 0u);
+
+    vp::cuda_backend be;
+    const vp::mesh<vp::cuda_backend> on_device(be, mesh.positions, mesh.triangles);
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, decltype(vp::constant(true))>;
+    const draw_type one{on_device.view(), {}, vp::constant(true)};
+    const std::span<const draw_type> draws(&one, 1);
+    vp::sparse_result<vp::target<vp::bit, blend::bit_or>> result;
+    vp::workspace_limits limits{}, need{};
+    const vp::voxelize_options options{vp::coverage::conservative};
+    const auto run = [&] {
+        const std::size_t bytes = vp::workspace_bytes(draws, g, result, options, limits);
+        vp::cuda_backend::buffer<std::byte> memory(be, bytes);
+        const vp::workspace_view workspace{memory.data(), bytes, limits};
+        EXPECT_TRUE(vp::voxelize_async(be, draws, g, result, options, workspace).ok());
+        const vp::status s = vp::read_status(be, workspace, &need);
+        EXPECT_EQ(result.to_host(be).num_bricks(), 0u);
+        return s;
+    };
+    EXPECT_EQ(run().code, vp::status_code::capacity_exceeded);
+    EXPECT_EQ(need.nodes, 1u);
+    EXPECT_EQ(need.bricks, 0u);
+    limits = need;
+    EXPECT_TRUE(run().ok());
+}
+
 // Triangles that pass through a part of a large grid: longer than 64 bits hold, and longer than the grid's size twice,
 // so that each is a floor, a wall or a slope there; with many small ones. The part begins on a brick.
 TEST(DeviceSparse, LargeTrianglesGiveTheBytesOfTheCpu) {
@@ -393,6 +478,8 @@ TEST(DeviceSparse, InMemoryOfTheCaller) {
     } const grids[]{{unit::unit_grid({61, 50, 53}), glm::vec3(0)},
                     {unit::unit_grid({61, 50, 53}).crop({8, 16, 24}, {40, 19, 21}), glm::vec3(0)},
                     {unit::unit_grid({4096, 4096, 4096}), glm::vec3(3690, 1900, 250)},
+                    {unit::unit_grid({4096, 4096, 4096}).crop({3696, 1904, 248}, {48, 40, 40}), {3690, 1900, 230}},
+                    {unit::unit_grid({4096, 4096, 4096}).crop({3691, 1904, 249}, {57, 39, 46}), {3690, 1900, 230}},
                     {unit::unit_grid(glm::ivec3(1 << 17)), glm::vec3(130000, 1900, 65500)}};
     for (const auto& [g, by] : grids) {
         unit::small_mesh mesh = unit::make_mesh(31, 45, {61, 50, 53}), moved = unit::make_mesh(32, 45, {61, 50, 53});

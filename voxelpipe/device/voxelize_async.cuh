@@ -33,7 +33,8 @@ struct workspace_limits {
     // As cuda_backend::strategy.
     voxelpipe::strategy strategy = voxelpipe::strategy::automatic;
     // Sparse results alone: bricks of 8 x 8 x 8 voxels and tiles, voxels that exist in bricks and one a tile, and nodes
-    // of 128 x 128 x 128 voxels with a brick. Grids of at most 2048 voxels a side have no nodes.
+    // of 128 x 128 x 128 voxels that hold a voxel of the grid's part and meet a triangle. Grids of at most 2048 voxels
+    // a side have no nodes.
     std::uint64_t bricks = 0, voxels = 0, nodes = 0;
 
     // A start for a mesh whose triangles are mostly smaller than a tile.

@@ -38,8 +38,8 @@ struct device_options {
     double voxel_bytes = 0;
     // What a triangle costs, in bytes of memory that its GPU could fill in the same time.
     double triangle_bytes = 512;
-    // Slabs begin at multiples of this: 8 for targets in bricks that are gathered, and for sparse framebuffers; those
-    // of grids of more than 2048 voxels a side may take several times as long where they begin at no multiple of 128.
+    // Slabs begin at multiples of this: 8 for targets in bricks that are gathered, and for sparse framebuffers, whose
+    // bricks a border would cut.
     int align = 1;
     bool may_turn = true;  // false: slabs along z, which A-buffers and gather() need
     bool is_solid = false; // for draw_solid: triangles beside the grid along x count too, and slabs are along y or z

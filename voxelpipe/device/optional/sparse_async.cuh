@@ -73,12 +73,12 @@ private:
             check_subsets(draws, &state->index_error, stream);
             bricks.clear(stream);
             Coverage::dispatch(options.rule, [&]<coverage Rule>() {
-                bricks.index.mark_above(
-                    [&](const index_level& level, int log2_cell) {
-                        raster.template mark<Rule>(level, log2_cell, is_coarse<Rule>(raster, log2_cell));
-                    },
-                    &state->sparse.nodes, stream);
-                raster.template mark<Rule>(bricks.index.bricks(), 3, is_coarse<Rule>(raster, 3));
+                constexpr bool is_coarse = brick_raster<draw_type>::template has_coarse<Rule>;
+                bricks.index.mark_above([&](const index_level& level,
+                                            int log2_cell) { raster.template mark<Rule>(level, log2_cell, is_coarse); },
+                                        &state->sparse.nodes, stream);
+                raster.template mark<Rule>(bricks.index.bricks(), index_level::log2_brick,
+                                           is_coarse && has_whole_bricks());
                 bricks.number(stream);
                 raster.template set_masks<Rule>(bricks.index.bricks(), bricks.masks, state);
                 made.publish(state, nullptr, options.count_voxels ? &bricks.totals->voxels : nullptr, stream);
@@ -101,10 +101,11 @@ private:
             made.set(result, g, nullptr, 0);
         }
     }
-    // A raster of cells would mark bricks at the border of a grid that is cut there, in which no voxel is.
-    template <coverage Rule>
-    [[nodiscard]] bool is_coarse(const brick_raster<draw_type>& raster, int log2_cell) const {
-        return raster.template is_coarse<Rule>(log2_cell) && g.extent % core::sparse_brick_size == glm::ivec3(0);
+    // A raster of bricks may mark those that the border of the grid's part cuts without a voxel in it; nothing drops
+    // them here.
+    [[nodiscard]] bool has_whole_bricks() const {
+        return g.offset % core::sparse_brick_size == glm::ivec3(0) &&
+               g.extent % core::sparse_brick_size == glm::ivec3(0);
     }
 
     template <bool Run>

@@ -124,7 +124,7 @@ struct index_size {
     int levels = 1; // 1: bricks; 2: nodes; 3: groups
     std::uint64_t top_words = 1;
 };
-[[nodiscard]] inline index_size index_size_of(const glm::ivec3& whole) {
+[[nodiscard]] constexpr index_size index_size_of(const glm::ivec3& whole) {
     constexpr unsigned max_side = 256, max_nodes = 512; // of bricks without nodes, of nodes without groups
     const auto largest = static_cast<unsigned>(std::max({whole.x, whole.y, whole.z}));
     index_size s;
@@ -169,7 +169,7 @@ public:
     // Writes the keys of all bricks, in order.
     void write_keys(std::uint64_t* keys) { write_keys(0, ~std::uint64_t{0}, keys); }
 
-    [[nodiscard]] static int log2_cell_of(int level) {
+    [[nodiscard]] static constexpr int log2_cell_of(int level) {
         return level == 2   ? index_level::log2_group_voxels
                : level == 1 ? index_level::log2_node_voxels
                             : index_level::log2_brick;

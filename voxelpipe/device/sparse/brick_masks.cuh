@@ -95,11 +95,11 @@ public:
     [[nodiscard]] status run(framebuffer& fb, bool count_voxels, std::uint64_t triangles_in) {
         // Until the end, because the pool of cudaMallocAsync gives back at each wait what is free, and mapping many MiB
         // again takes a call longer than drawing.
+        constexpr bool is_coarse = brick_raster<draw_type>::template has_coarse<Rule>;
         const lists of_raster(*this, raster_.template reads_setups<Rule>() || !(is_blended_once<Targets> && ...));
-        index_.mark_above([&](const index_level& level, int log2_cell) {
-            raster_.template mark<Rule>(level, log2_cell, raster_.template is_coarse<Rule>(log2_cell));
-        });
-        raster_.template mark<Rule>(index_.bricks(), 3, raster_.template is_coarse<Rule>(3));
+        index_.mark_above(
+            [&](const index_level& level, int log2_cell) { raster_.template mark<Rule>(level, log2_cell, is_coarse); });
+        raster_.template mark<Rule>(index_.bricks(), index_level::log2_brick, is_coarse);
         const std::uint64_t bricks = index_.make_numbers();
         end_stage(clock_, &stage_times::tile_sort);
         if (bricks > core::max_numbered) return core::failure(status_code::size_overflow, stage::coarse_raster);
@@ -192,7 +192,7 @@ private:
                                          counted, stream_);
         });
     }
-    // Bricks at a crop's border may have voxels beyond it alone.
+    // Bricks at the border of the grid's part may have been marked because of what lies beyond it.
     template <class Contents>
     void drop_empty_bricks(Contents& made, const device_buffer<std::uint32_t>& counts, std::uint64_t kept) {
         const auto bricks = static_cast<std::uint32_t>(counts.size());
