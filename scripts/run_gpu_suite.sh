@@ -121,8 +121,7 @@ run_suite() {
         [[ $source != */solid_calls_test.cu ]] || continue    # in device_solids_test
         [[ $source != */programs_async_test.cu ]] || continue # in device_programs_test
         [[ $source != */programs_goes_on_test.cu ]] || continue # in device_programs_test
-        [[ $source != */sparse_goes_on_test.cu ]] || continue  # in device_sparse_test
-        [[ $source != */sparse_merge_test.cu ]] || continue    # in device_sparse_test
+        [[ $source != */sparse_*_test.cu ]] || continue # in device_sparse_test
         program="build/$folder/tests/strategies/device_$(basename "$source" .cu)"
         [[ $part != default && $program == *scenes_test ]] && continue
         run_program "$part" "$(basename "$program")" "$program"
