@@ -112,7 +112,9 @@ public:
             bytes += p.num_bytes();
         }
         if (is_one) one = {bricks, voxels, s.counts.fragments, bytes, {}, 0, 0};
-        expect(bricks == one.bricks && voxels == one.voxels && s.counts.fragments == one.fragments, "counts");
+        const bool cuts_bricks = how_.align % 8 != 0 && !is_one;
+        expect((cuts_bricks || bricks == one.bricks) && voxels == one.voxels && s.counts.fragments == one.fragments,
+               "counts");
         m.compared = "counts";
         if (one.bytes <= how_.largest_compared) {
             std::vector<typename expected<Kind>::host> on_host;
