@@ -93,20 +93,20 @@ __global__ void count_word_bits(const index_word* words, std::uint32_t count, st
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     if (i < count) counts[i] = static_cast<unsigned>(__popcll(words[i].bits));
 }
-// Numbers from `most` on, of bits that are too many for the caller's memory, are `most` to `most` + 63.
+// Bits beyond `capacity`, which is the room in the caller's memory, get numbers from capacity to capacity + 63.
 template <int = 0> // compiled where it is called
 __global__ void number_words(index_word* words, std::uint32_t count, const unsigned long long* before,
-                             std::uint32_t most, unsigned long long* total) {
+                             std::uint32_t capacity, unsigned long long* total) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     if (i >= count) return;
-    words[i].before = before[i] < most ? static_cast<std::uint32_t>(before[i]) : most;
+    words[i].before = before[i] < capacity ? static_cast<std::uint32_t>(before[i]) : capacity;
     if (i + 1 == count) *total = before[i] + static_cast<unsigned>(__popcll(words[i].bits));
 }
-// The keys of all bits, in order; of the first `most`. node_keys: of the cells above that the words belong to; null if
+// The keys of the first `capacity` bits, in order. node_keys: of the cells above that the words belong to; null if
 // there are none.
 template <int = 0> // compiled where it is called
 __global__ void list_keys(const index_word* words, std::uint32_t count, const std::uint64_t* node_keys,
-                          std::uint64_t most, std::uint64_t* keys) {
+                          std::uint64_t capacity, std::uint64_t* keys) {
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
     if (i >= count) return;
     const index_word w = words[i];
@@ -115,7 +115,7 @@ __global__ void list_keys(const index_word* words, std::uint32_t count, const st
         node_keys == nullptr ? i
                              : node_keys[i >> index_level::log2_node_words] << index_level::log2_node_words | (i & 63u);
     std::uint64_t at = w.before;
-    for (unsigned long long bits = w.bits; bits != 0 && at < most; bits &= bits - 1)
+    for (unsigned long long bits = w.bits; bits != 0 && at < capacity; bits &= bits - 1)
         keys[at++] = number << 6 | static_cast<unsigned>(__ffsll(static_cast<long long>(bits)) - 1);
 }
 
@@ -190,11 +190,11 @@ private:
         words_[l - 1] = index_word_buffer(memory_, std::max<std::uint64_t>(1, num << index_level::log2_node_words));
         clear(words_[l - 1]);
     }
-    void write_keys(int l, std::uint64_t most, std::uint64_t* keys) {
-        launch_kernel(false, list_keys<0>, num_blocks(words_[l].size()), threads_per_block, 0, memory_.stream,
-                      stage::tile_sort, static_cast<const index_word*>(words_[l].data()),
-                      static_cast<std::uint32_t>(words_[l].size()),
-                      static_cast<const std::uint64_t*>(l + 1 < size_.levels ? keys_[l].data() : nullptr), most, keys);
+    void write_keys(int l, std::uint64_t capacity, std::uint64_t* keys) {
+        launch_kernel(
+            false, list_keys<0>, num_blocks(words_[l].size()), threads_per_block, 0, memory_.stream, stage::tile_sort,
+            static_cast<const index_word*>(words_[l].data()), static_cast<std::uint32_t>(words_[l].size()),
+            static_cast<const std::uint64_t*>(l + 1 < size_.levels ? keys_[l].data() : nullptr), capacity, keys);
     }
     void clear(index_word_buffer& words) {
         check(cudaMemsetAsync(words.data(), 0, words.size() * sizeof(index_word), memory_.stream), stage::tile_sort);

@@ -93,9 +93,9 @@ public:
 
     template <coverage Rule>
     [[nodiscard]] status run(framebuffer& fb, bool count_voxels, std::uint64_t triangles_in) {
+        constexpr bool is_coarse = brick_raster<draw_type>::template has_coarse<Rule>;
         // Until the end, because the pool of cudaMallocAsync gives back at each wait what is free, and mapping many MiB
         // again takes a call longer than drawing.
-        constexpr bool is_coarse = brick_raster<draw_type>::template has_coarse<Rule>;
         const lists of_raster(*this, raster_.template reads_setups<Rule>() || !(is_blended_once<Targets> && ...));
         index_.mark_above(
             [&](const index_level& level, int log2_cell) { raster_.template mark<Rule>(level, log2_cell, is_coarse); });

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The deferred pass of conservative coverage into masks. A warp sets up to 32 triangles up, finds the bricks that they
-// meet, a lane each, and then draws 32 pairs of a triangle and a brick at a time: a lane looks its brick up once and
-// writes each word once, and the rows of all pairs are shared out. So lanes have equal work, whatever the sizes of
-// their triangles; a large triangle is drawn by many warps, work item by work item (raster/split_triangles.cuh). Bricks
-// must lie on the raster: its first voxel is that of a brick.
+// The deferred pass of conservative coverage into masks. A warp makes the setups of up to 32 triangles, finds the
+// bricks that they meet, a lane each, and then draws 32 pairs of a triangle and a brick at a time: a lane looks its
+// brick up once and writes each word once, and the rows of all pairs are shared out. So lanes have equal work, whatever
+// the sizes of their triangles; a large triangle is drawn by many warps, work item by work item
+// (raster/split_triangles.cuh). Bricks must lie on the raster: its first voxel is that of a brick.
 
 #include <voxelpipe/device/raster/raster.cuh>
 #include <voxelpipe/device/sparse/mask_drawer.cuh>
@@ -15,7 +15,7 @@
 
 namespace voxelpipe::device {
 
-// Sets small triangles up, up to 32, and draws them. All lanes call it.
+// Makes the setups of up to 32 small triangles, and draws them. All lanes call it.
 template <class Call>
 __device__ VOXELPIPE_INLINE void draw_small_masks(const Call& call, mask_drawer<false, Call>& drawer,
                                                   mask_memory& memory, bool valid, std::uint32_t triangle) {
@@ -82,7 +82,7 @@ __device__ __noinline__ unsigned draw_mask_lists(const Call& call, mask_memory& 
     return drawer.fragments;
 }
 
-// Sets a large triangle up: number `number` of the split ones.
+// Makes the setup of a large triangle: number `number` of the split ones.
 template <class Call>
 __device__ __noinline__ void set_up_large_mask(const Call& call, large_mask_triangle& to, std::uint32_t number) {
     to.find(call, number);
