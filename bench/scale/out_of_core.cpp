@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Out of core: a generated mesh that is never there as a whole, voxelized within a budget of memory.
 //
-//   bench_out_of_core [TRIANGLES [RESOLUTION [BUDGET_MIB [FOLDER [SLABS]]]]]
+//   bench_out_of_core [TRIANGLES [RESOLUTION [BUDGET_MIB [FOLDER [SLABS [REPAIR]]]]]]
 //   bench_out_of_core 1000000000 16384 16384 /scratch      # 10^9 triangles into 16,384^3
+//   bench_out_of_core 20000000 1024 256 /var/tmp 0 vote    # its inside; close_holes and exterior too
 //
 // The mesh is a relief over a unit square, of two triangles for each of its cells, some strips at a time. Voxels go
 // into a sparse framebuffer of one bit, whose bricks are counted, added to a checksum that no cut of the grid changes,
@@ -33,6 +34,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -128,6 +130,15 @@ traffic traffic_so_far() {
     return t;
 }
 
+vp::repair repair_of(const std::string& name) {
+    for (const auto& [known, kind] : {std::pair{"none", vp::repair::none},
+                                      {"close_holes", vp::repair::close_holes},
+                                      {"vote", vp::repair::vote},
+                                      {"exterior", vp::repair::exterior}})
+        if (name == known) return kind;
+    throw std::runtime_error("no repair " + name);
+}
+
 int run(int argc, char** argv) {
 #ifdef M_ARENA_MAX
     // Memory that one thread frees serves the others. By default glibc keeps some for each thread, which the peak
@@ -142,10 +153,14 @@ int run(int argc, char** argv) {
     options.folder = argc > 4 ? argv[4] : "/tmp";
     options.align = 8;
     options.voxel_bytes = 0.02; // of a relief's bricks, a voxel of the grid
+    options.repair = repair_of(argc > 6 ? argv[6] : "none");
+    options.is_solid = argc > 6;
+    if (options.is_solid) options.voxel_bytes = 0; // an estimate
     const auto triangles_asked = 2.0 * static_cast<double>(side * side);
     constexpr double slab_triangle = 304; // bytes that a slab's call takes for one
     const double fitting = 3 * slab_triangle * triangles_asked / (0.75 * static_cast<double>(options.memory));
-    options.num_slabs = static_cast<int>(number(5, std::clamp(fitting, 64.0, 1024.0)));
+    options.num_slabs = static_cast<int>(number(5, 0));
+    if (options.num_slabs == 0) options.num_slabs = static_cast<int>(std::clamp(fitting, 64.0, 1024.0));
     const double bin_bytes = triangles_asked * sizeof(slabs::record<vp::no_varyings>);
     const disk_rate disk =
         measure_disk(options.folder, static_cast<std::uint64_t>(std::min(bin_bytes, double{1 << 30})) + 1);
@@ -169,19 +184,18 @@ int run(int argc, char** argv) {
     using bits = vp::sparse_framebuffer<vp::cpu_backend, vp::target<vp::bit, vp::blend::bit_or>>;
     std::uint64_t bricks = 0, voxels = 0, parts = 0, sum = 0;
     const double start = seconds();
-    const vp::status s = stream.draw(
-        vp::constant(true),
-        [&](glm::ivec3 extent) {
-            return bits{backend, extent};
-        },
-        [&](const slabs::slab&, const bits& part) {
-            const double begin = seconds();
-            ++parts;
-            bricks += part.num_bricks();
-            voxels += part.num_voxels();
-            sum += checksum(part);
-            sinking += seconds() - begin;
-        });
+    const auto make = [&](glm::ivec3 extent) { return bits{backend, extent}; };
+    const auto sink = [&](const slabs::slab&, const bits& part) {
+        const double begin = seconds();
+        ++parts;
+        bricks += part.num_bricks();
+        voxels += part.num_voxels();
+        sum += checksum(part);
+        sinking += seconds() - begin;
+    };
+    const vp::status s = options.is_solid
+                             ? stream.draw_solid(vp::constant(true), make, sink, {.repair = options.repair})
+                             : stream.draw(vp::constant(true), make, sink);
     const double drawing = seconds() - start - sinking;
     const traffic after = traffic_so_far();
     const double written = after.written - before.written, read = after.read - before.read;
