@@ -6,9 +6,11 @@
 #include "slab_scene.hpp"
 
 #include <voxelpipe/slabs/route.hpp>
+#include <voxelpipe/slabs/slab_queue.hpp>
 
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstring>
 #include <system_error>
@@ -141,6 +143,43 @@ TEST(Bins, AFullMediumIsReported) {
     (void)setrlimit(RLIMIT_FSIZE, &before);
     (void)std::signal(SIGXFSZ, signal);
     EXPECT_NE(what.find("cannot write a temporary file"), std::string::npos) << what;
+}
+
+// Slabs that are visited twice: parts of one that was cut do not stay in memory for the second time.
+TEST(SlabQueue, PartsThatAreKeptAreInFiles) {
+    using plain_record = slabs::record<vp::no_varyings>;
+    const vp::grid grid = unit::unit_grid(extent);
+    slabs::stream_options options;
+    options.folder = ::testing::TempDir();
+    std::vector<slabs::bin<plain_record>> bins(1);
+    slabs::bin_memory<plain_record> memory(options.memory, 1, options.folder);
+    const colored_mesh m = make_scene();
+    const slabs::chunk_records<vp::no_varyings, vp::mesh_view<>> chunk(m.view(), vp::passthrough{}, grid, {}, 0);
+    vp::counters counts;
+    ASSERT_TRUE(
+        chunk.visit(0, m.triangles.size(), counts, [&](const plain_record& r, const auto&) { memory.push(bins, 0, r); })
+            .ok());
+    slabs::detail::slab_queue<vp::no_varyings> queue;
+    queue.start(options, 2, 2, 0);
+    queue.push_back(grid, std::move(bins[0]));
+    const auto visit = [&](bool is_second) {
+        std::vector<std::uint32_t> numbers;
+        const double room = 12'000; // voxels
+        const vp::status s = queue.for_each({0, 1, room}, !is_second, [&](const auto& slab, const auto& triangles) {
+            if (is_second) {
+                EXPECT_EQ(slab.triangles.in_memory(), 0u);
+            }
+            numbers.push_back(0xffffffff); // a border
+            numbers.insert(numbers.end(), triangles.numbers.begin(), triangles.numbers.end());
+            return vp::status{};
+        });
+        EXPECT_TRUE(s.ok());
+        return numbers;
+    };
+    const std::vector<std::uint32_t> first = visit(false);
+    EXPECT_GT(std::count(first.begin(), first.end(), 0xffffffff), 3);
+    EXPECT_GT(first.size(), m.triangles.size() / 2);
+    EXPECT_EQ(visit(true), first);
 }
 
 } // namespace

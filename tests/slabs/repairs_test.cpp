@@ -12,7 +12,7 @@ using namespace slab_scene;
 
 struct winding {
     auto operator()(const vp::solid_fragment& f) const {
-        return vp::outputs(static_cast<std::int32_t>(f.winding + 3 * f.voxel.z + 100));
+        return vp::outputs(static_cast<std::int32_t>(f.winding + std::int64_t{3} * f.voxel.z + 100));
     }
 };
 using targets = vp::framebuffer<backend_type, vp::target<std::int32_t, vp::blend::add>>;

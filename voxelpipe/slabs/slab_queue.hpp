@@ -51,6 +51,7 @@ public:
     struct entry {
         grid where;
         bin<record_type> triangles;
+        bool is_cut = false;         // a part of a slab that was too large, whose triangles have memory of their own
         std::future<arrays> loading; // begun while another slab is drawn
     };
 
@@ -62,7 +63,7 @@ public:
         last_axis_ = last_axis;
     }
     void push_back(const grid& where, bin<record_type>&& triangles) {
-        slabs_.push_back({where, std::move(triangles), {}});
+        slabs_.push_back({where, std::move(triangles), false, {}});
     }
 
     // Calls work(entry, its triangles) for each slab, in order, which returns a status. One that exceeds the costs, or
@@ -84,7 +85,10 @@ public:
             }
             if (result.code == status_code::out_of_memory && cut_front(cost, bytes / 2)) continue;
             if (!result.ok()) return result;
-            if (keeps) done.push_back(std::move(next));
+            if (keeps) {
+                if (next.is_cut && next.triangles.in_memory() != 0) next.triangles.spill(options_->folder).write();
+                done.push_back(std::move(next));
+            }
             slabs_.pop_front();
         }
         slabs_ = std::move(done);
@@ -151,7 +155,7 @@ private:
         });
         slabs_.pop_front();
         for (std::size_t i = bins.size(); i-- > 0;)
-            slabs_.push_front({parts.crop(whole.where, i), std::move(bins[i]), {}});
+            slabs_.push_front({parts.crop(whole.where, i), std::move(bins[i]), true, {}});
         return true;
     }
 
