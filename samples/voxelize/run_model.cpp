@@ -120,6 +120,20 @@ void run_slabs(const command_line& options, slab_source&& source, run_report& re
     std::cerr << '\n';
 }
 
+// True if a model takes an eighth of the run's memory, so that its stream may fit where it does not. Copies are not
+// counted: a stream goes through all of them, however many.
+bool is_large(const scene& model) {
+    double bytes = 0;
+    for (const primitive& part : model.primitives) // as they are stored, snapped and paired with tiles
+        bytes += 36 * (static_cast<double>(part.positions.size()) + static_cast<double>(part.triangles.size()));
+    for (const picture& image : model.images) {
+        bytes += static_cast<double>(image.rgba.size());
+        for (const auto& levels : image.levels)
+            if (levels) bytes += static_cast<double>(levels->size() * sizeof((*levels)[0]));
+    }
+    return 8 * bytes > static_cast<double>(memory::limit());
+}
+
 // Does the work, with the model as OPENED has it. helps_to_stream: true as long as a shortage of memory may be one that
 // a loaded model makes and a streamed one does not.
 void run(const command_line& options, clock::time_point begin, const opened_stream& opened, run_report& report,
@@ -137,7 +151,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     triangle_stream::boxes boxes;
     if (stream) boxes = stream->bounds();
     scene model = stream ? outline_of(*stream, boxes) : load_whole(options.input, load, opened);
-    helps_to_stream = !stream && !model.images.empty();
+    helps_to_stream = !stream && is_large(model);
     report.warnings = options.warnings;
     report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
     report.vertices = stream ? stream->num_vertices() : model.vertex_count();
@@ -231,7 +245,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
 }
 
 // Every failure is an exception. Streams a model that does not fit otherwise. How much its pictures take is known only
-// once they are held: one that fits without them alone is loaded first.
+// once they are held, and how much drawing takes only by an estimate: one that may fit is loaded first.
 void run_either_way(const command_line& options, clock::time_point begin, run_report& report) {
     const std::filesystem::path folder = folder_of(options.outputs.front());
     const double options_ms = milliseconds_since(begin);

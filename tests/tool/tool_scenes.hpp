@@ -5,6 +5,8 @@
 
 #include "gltf_builder.hpp"
 
+#include <cmath>
+
 namespace gltf_test {
 
 // A square from (0, 0, z) to (1, 1, z) that faces +z; its picture stands upright as seen from there.
@@ -53,6 +55,20 @@ inline void add_sheet(builder& file, int side) {
     const int index_accessor = file.accessor(indices, "SCALAR");
     file.mesh({{"POSITION", file.accessor(positions, "VEC3")}})["indices"] = index_accessor;
     file.root["nodes"] = json::array();
+}
+
+// A relief that rises over 2 SIDE^2 triangles, which share no vertex.
+inline json& add_relief(builder& file, int side) {
+    std::vector<float> positions;
+    for (int n = 0; n < 2 * side * side; ++n)
+        for (int corner = 0; corner < 3; ++corner) {
+            const int x = n / 2 % side + (n % 2 == 0 ? corner == 1 : corner != 2),
+                      y = n / 2 / side + (n % 2 == 0 ? corner == 2 : corner != 0);
+            const float u = static_cast<float>(x) / static_cast<float>(side),
+                        v = static_cast<float>(y) / static_cast<float>(side);
+            positions.insert(positions.end(), {u, v, 0.1F + 0.5F * u + 0.3F * v * std::sin(9 * u)});
+        }
+    return file.mesh({{"POSITION", file.accessor(positions, "VEC3")}});
 }
 
 // A sheet, and a triangle without indices, under a node that turns, mirrors and stretches them.

@@ -81,17 +81,7 @@ TEST(StreamedColors, MasksAndBlendsOfGltf) {
     if (sanitized) return;
     const scratch_folder folder;
     builder file;
-    constexpr int side = 360;
-    std::vector<float> positions; // three a triangle
-    for (int n = 0; n < 2 * side * side; ++n)
-        for (int corner = 0; corner < 3; ++corner) {
-            const int x = n / 2 % side + (n % 2 == 0 ? corner == 1 : corner != 2),
-                      y = n / 2 / side + (n % 2 == 0 ? corner == 2 : corner != 0);
-            const float u = static_cast<float>(x) / side, v = static_cast<float>(y) / side;
-            positions.insert(positions.end(), {u, v, 0.1F + 0.5F * u + 0.3F * v * std::sin(9 * u)});
-        }
-    json& relief = file.mesh({{"POSITION", file.accessor(positions, "VEC3")}});
-    relief["material"] = gltf_test::add_material(file, {0.9, 0.2, 0.1, 1});
+    gltf_test::add_relief(file, 320)["material"] = gltf_test::add_material(file, {0.9, 0.2, 0.1, 1});
     const std::vector<std::uint8_t> holes{255, 255, 0, 255, 255, 255, 255, 0, 255, 255, 255, 0, 0, 255, 255, 255};
     gltf_test::add_square(file, 0.6F)["material"] =
         gltf_test::add_textured_material(file, 2, 2, holes, {{"alphaMode", "MASK"}, {"alphaCutoff", 0.5}});

@@ -331,6 +331,21 @@ TEST(Streamed, ModelsThatFitOnlyWithoutTheirPictures) {
     values.expect_equal(62);
 }
 
+// A model without pictures that is loaded, since its estimate fits, and runs out of memory while it is drawn.
+TEST(Streamed, ModelsThatDoNotFitWhileTheyAreDrawn) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    builder file;
+    gltf_test::add_relief(file, 300); // 36 bytes a triangle and vertex: 25 MiB
+    file.write_glb(folder / "m.glb");
+    two_ways{folder, folder / "m.glb", {"-r", "80", "-t", "count,normal,triangle,depth"}}.expect_equal(48);
+    // A model that is little of what does not fit is not drawn twice.
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const outcome tight = two_ways{folder, folder / "m.glb", {"-r", "2000"}}.draw("no.npz", {"--max-memory", "40"});
+    EXPECT_EQ(3, tight.code) << tight.err;
+    EXPECT_EQ(std::string::npos, tight.err.find(" triangles do not fit")) << tight.err;
+}
+
 #if VOXELPIPE_TOOL_HAS_ASSIMP
 TEST(Streamed, ColorsOfPlyVertices) {
     if (sanitized) return;
