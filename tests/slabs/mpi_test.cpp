@@ -145,53 +145,59 @@ TEST(RankSolids, RepairedSlabsAreTheWhole) {
     using solid_stream = slabs::mpi_stream<backend_type, vp::passthrough>;
     backend_type backend = unit::make_backend(1);
     const vp::grid uncut = unit::unit_grid(extent);
-    for (const vp::grid& grid : {uncut, uncut.crop({3, 5, 9}, {30, 21, 22})})
-        for (const unit::small_mesh& mesh : {broken_scene(extent), plates(extent)})
-            for (const std::uint64_t memory : {std::uint64_t{1} << 30, std::uint64_t{120'000}})
-                for (const vp::solid_options& how :
-                     {vp::solid_options{}, vp::solid_options{.repair = vp::repair::close_holes},
-                      vp::solid_options{
-                          .extent = vp::solid_extent::outer, .repair = vp::repair::close_holes, .max_hole_edges = 3},
-                      vp::solid_options{.repair = vp::repair::vote}}) {
-                    targets whole{backend, grid.extent};
-                    const vp::status one =
-                        vp::voxelize_solid(backend, mesh.view(), grid, vp::passthrough{}, winding{}, whole, how);
-                    ASSERT_TRUE(one.ok()) << one.message();
-                    const auto expected = vp::get<0>(whole).to_host_target(backend);
-                    slabs::stream_options options;
-                    options.memory = memory;
-                    options.folder = ::testing::TempDir();
-                    options.is_solid = true;
-                    options.repair = how.repair;
-                    solid_stream stream(MPI_COMM_WORLD, backend, grid, {}, options);
-                    const auto [first, last] = slabs::share_of(mesh.triangles.size(), my_rank(), num_ranks());
-                    stream
-                        .add({mesh.positions,
-                              vp::array_view<const glm::uvec3>(mesh.triangles.data() + first, last - first)})
-                        .or_throw();
-                    std::uint64_t wrong = 0, voxels = 0;
-                    const vp::status s = stream.draw_solid(
-                        winding{},
-                        [&](glm::ivec3 size) {
-                            return targets{backend, size};
-                        },
-                        [&](const slabs::slab& slab, const targets& fb) {
-                            const auto part = vp::get<0>(fb).to_host_target(backend);
-                            const glm::ivec3 o = slab.where.offset - grid.offset;
-                            unit::for_each_voxel(slab.where.extent, [&](int x, int y, int z) {
-                                wrong += part(x, y, z) != expected(o.x + x, o.y + y, o.z + z) ? 1 : 0;
-                                ++voxels;
-                            });
-                        },
-                        how);
-                    EXPECT_TRUE(s.ok()) << s.message();
-                    EXPECT_EQ(s.counts, one.counts);
-                    EXPECT_EQ(s.solid, one.solid);
-                    EXPECT_EQ(wrong, 0u);
-                    EXPECT_EQ(sum_of_ranks(voxels), static_cast<std::uint64_t>(grid.extent.x) *
-                                                        static_cast<std::uint64_t>(grid.extent.y) *
-                                                        static_cast<std::uint64_t>(grid.extent.z));
-                }
+    struct drawing {
+        vp::grid grid;
+        unit::small_mesh mesh;
+        std::uint64_t memory;
+    };
+    for (const drawing& d : {drawing{uncut, broken_scene(extent), std::uint64_t{1} << 30},
+                             {uncut, broken_scene(extent), 120'000},
+                             {uncut, plates(extent), std::uint64_t{1} << 30},
+                             {uncut.crop({3, 5, 9}, {30, 21, 22}), broken_scene(extent), 120'000}})
+        for (const vp::solid_options& how :
+             {vp::solid_options{}, vp::solid_options{.repair = vp::repair::close_holes},
+              vp::solid_options{
+                  .extent = vp::solid_extent::outer, .repair = vp::repair::close_holes, .max_hole_edges = 3},
+              vp::solid_options{.repair = vp::repair::vote}}) {
+            const vp::grid& grid = d.grid;
+            const unit::small_mesh& mesh = d.mesh;
+            targets whole{backend, grid.extent};
+            const vp::status one =
+                vp::voxelize_solid(backend, mesh.view(), grid, vp::passthrough{}, winding{}, whole, how);
+            ASSERT_TRUE(one.ok()) << one.message();
+            const auto expected = vp::get<0>(whole).to_host_target(backend);
+            slabs::stream_options options;
+            options.memory = d.memory;
+            options.folder = ::testing::TempDir();
+            options.is_solid = true;
+            options.repair = how.repair;
+            solid_stream stream(MPI_COMM_WORLD, backend, grid, {}, options);
+            const auto [first, last] = slabs::share_of(mesh.triangles.size(), my_rank(), num_ranks());
+            stream.add({mesh.positions, vp::array_view<const glm::uvec3>(mesh.triangles.data() + first, last - first)})
+                .or_throw();
+            std::uint64_t wrong = 0, voxels = 0;
+            const vp::status s = stream.draw_solid(
+                winding{},
+                [&](glm::ivec3 size) {
+                    return targets{backend, size};
+                },
+                [&](const slabs::slab& slab, const targets& fb) {
+                    const auto part = vp::get<0>(fb).to_host_target(backend);
+                    const glm::ivec3 o = slab.where.offset - grid.offset;
+                    unit::for_each_voxel(slab.where.extent, [&](int x, int y, int z) {
+                        wrong += part(x, y, z) != expected(o.x + x, o.y + y, o.z + z) ? 1 : 0;
+                        ++voxels;
+                    });
+                },
+                how);
+            EXPECT_TRUE(s.ok()) << s.message();
+            EXPECT_EQ(s.counts, one.counts);
+            EXPECT_EQ(s.solid, one.solid);
+            EXPECT_EQ(wrong, 0u);
+            EXPECT_EQ(sum_of_ranks(voxels), static_cast<std::uint64_t>(grid.extent.x) *
+                                                static_cast<std::uint64_t>(grid.extent.y) *
+                                                static_cast<std::uint64_t>(grid.extent.z));
+        }
     slabs::stream_options flood;
     flood.repair = vp::repair::exterior;
     solid_stream refused(MPI_COMM_WORLD, backend, uncut, {}, flood);

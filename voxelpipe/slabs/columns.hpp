@@ -117,10 +117,6 @@ public:
     // Of a grid, or of a crop of one: its columns begin at its lowest layer.
     explicit column_sweep(const grid& g)
         : columns_(g), open_(columns_.words()), below_(columns_.words()), next_(columns_.words()) {}
-    // Bytes that the bits of a grid take.
-    [[nodiscard]] static double bytes(const grid& g) {
-        return 3 * 8 * static_cast<double>(detail::crossed_columns(g).words());
-    }
 
     // A triangle, snapped in the grid; each of the mesh once, wherever it lies. One that cannot be drawn is left out.
     void add(const core::snapped_position& a, const core::snapped_position& b, const core::snapped_position& c) {
