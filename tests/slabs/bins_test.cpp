@@ -154,7 +154,8 @@ TEST(SlabQueue, PartsThatAreKeptAreInFiles) {
     std::vector<slabs::bin<plain_record>> bins(1);
     slabs::bin_memory<plain_record> memory(options.memory, 1, options.folder);
     const colored_mesh m = make_scene();
-    const slabs::chunk_records<vp::no_varyings, vp::mesh_view<>> chunk(m.view(), vp::passthrough{}, grid, {}, 0);
+    const vp::mesh_view<> view = m.view();
+    const slabs::chunk_records<vp::no_varyings, vp::mesh_view<>> chunk(view, vp::passthrough{}, grid, {}, 0);
     vp::counters counts;
     ASSERT_TRUE(
         chunk.visit(0, m.triangles.size(), counts, [&](const plain_record& r, const auto&) { memory.push(bins, 0, r); })
