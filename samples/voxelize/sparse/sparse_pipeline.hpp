@@ -143,10 +143,8 @@ private:
     template <class Draw>
     int draw_within(double bytes_of_voxel, int pass, int passes, const Draw& draw) {
         const voxelpipe::grid all = this->uploaded_->relative_grid();
-        constexpr double least_work = 64 << 20;
-        const double work = this->request_.work_memory != 0
-                                ? static_cast<double>(this->request_.work_memory)
-                                : std::max(least_work, static_cast<double>(memory::room()) / 4);
+        const double work = this->request_.work_memory != 0 ? static_cast<double>(this->request_.work_memory)
+                                                            : static_cast<double>(memory::room()) / 4;
         const auto budget = static_cast<std::uint64_t>(work / bytes_of_voxel);
         const double slabs = std::ceil(likely_voxels() / static_cast<double>(budget));
         constexpr int tile = 32;
