@@ -37,15 +37,16 @@ inline int add_textured_material(builder& file, std::uint32_t width, std::uint32
     return file.append("materials", entry);
 }
 
-// A wavy sheet of SIDE^2 quads with one of its vertices at the origin, as mesh 0; no node shows it.
-inline void add_sheet(builder& file, int side) {
+// A sheet of SIDE^2 quads and seven heights, STEP one above the other, with one of its vertices at the origin, as mesh
+// 0; no node shows it.
+inline void add_sheet(builder& file, int side, float step = 0.05F) {
     std::vector<float> positions;
     std::vector<std::uint32_t> indices;
     for (int y = 0; y <= side; ++y)
         for (int x = 0; x <= side; ++x)
             positions.insert(positions.end(),
                              {static_cast<float>(x) / static_cast<float>(side),
-                              static_cast<float>(y) / static_cast<float>(side), static_cast<float>(x * y % 7) / 20});
+                              static_cast<float>(y) / static_cast<float>(side), static_cast<float>(x * y % 7) * step});
     for (int y = 0; y < side; ++y)
         for (int x = 0; x < side; ++x) {
             const auto at = static_cast<std::uint32_t>(y * (side + 1) + x),
@@ -73,7 +74,7 @@ inline json& add_relief(builder& file, int side) {
 
 // A sheet, and a triangle without indices, under a node that turns, mirrors and stretches them.
 inline void add_two_parts(builder& file, int side) {
-    add_sheet(file, side);
+    add_sheet(file, side, 0.02F);
     const int alone = file.accessor(std::vector<float>{0, 0, 0.1f, 1, 0, 0.2f, 0, 1, 0.3f}, "VEC3");
     file.root["meshes"][0]["primitives"].push_back({{"attributes", {{"POSITION", alone}}}});
     file.append("nodes", {{"mesh", 0}, {"matrix", {0, 0, 2, 0, 1, 0, 0, 0, 0, -1.5, 0, 0, 7, 8, 9, 1}}});

@@ -22,33 +22,59 @@ namespace {
 
 constexpr int side = 320;
 
+struct mesh {
+    std::vector<std::array<float, 3>> vertices;
+    std::vector<std::array<std::int32_t, 3>> faces;
+};
+
 // A wavy ball from 0.05 to 0.95 of 2 SIDE^2 triangles; without those of a window of HOLE quads a side, which looks
 // along x, y and z a little.
-void write_ball(const fs::path& file, int hole) {
-    std::ofstream out(file, std::ios::binary);
-    out << "ply\nformat binary_little_endian 1.0\nelement vertex " << side * (side + 1)
-        << "\nproperty float x\nproperty float y\nproperty float z\nelement face " << 2 * (side * side - hole * hole)
-        << "\nproperty list uchar int vertex_indices\nend_header\n";
-    const auto put = [&](const auto& value) { out.write(reinterpret_cast<const char*>(&value), sizeof(value)); };
+mesh ball_with(int hole) {
+    mesh ball;
     constexpr double pi = 3.14159265358979;
     for (int v = 0; v <= side; ++v)
         for (int u = 0; u < side; ++u) {
             const double a = 2 * pi * u / side, b = pi * v / side, r = 0.4 + 0.05 * std::sin(5 * a) * std::sin(4 * b);
-            put(static_cast<float>(0.5 + r * std::cos(a) * std::sin(b)));
-            put(static_cast<float>(0.5 + r * std::sin(a) * std::sin(b)));
-            put(static_cast<float>(0.5 - r * std::cos(b)));
+            ball.vertices.push_back({static_cast<float>(0.5 + r * std::cos(a) * std::sin(b)),
+                                     static_cast<float>(0.5 + r * std::sin(a) * std::sin(b)),
+                                     static_cast<float>(0.5 - r * std::cos(b))});
         }
     for (int v = 0; v < side; ++v)
         for (int u = 0; u < side; ++u) {
             if (u >= 30 && u < 30 + hole && v >= 110 && v < 110 + hole) continue;
             const int next = (u + 1) % side, a = v * side + u, b = v * side + next;
-            for (const auto& [p, q, r] : {std::array{a, b, b + side}, std::array{a, b + side, a + side}}) {
-                put(std::uint8_t{3});
-                put(std::int32_t{p});
-                put(std::int32_t{q});
-                put(std::int32_t{r});
-            }
+            ball.faces.push_back({a, b, b + side});
+            ball.faces.push_back({a, b + side, a + side});
         }
+    return ball;
+}
+
+// By the extension: .ply, .stl, binary both, or .obj.
+void write_ball(const fs::path& file, int hole) {
+    const mesh ball = ball_with(hole);
+    std::ofstream out(file, std::ios::binary);
+    const auto put = [&](const auto& value) { out.write(reinterpret_cast<const char*>(&value), sizeof(value)); };
+    if (file.extension() == ".ply") {
+        out << "ply\nformat binary_little_endian 1.0\nelement vertex " << ball.vertices.size()
+            << "\nproperty float x\nproperty float y\nproperty float z\nelement face " << ball.faces.size()
+            << "\nproperty list uchar int vertex_indices\nend_header\n";
+        for (const auto& vertex : ball.vertices) put(vertex);
+        for (const auto& face : ball.faces) {
+            put(std::uint8_t{3});
+            put(face);
+        }
+    } else if (file.extension() == ".stl") {
+        out << std::string(80, ' ');
+        put(static_cast<std::uint32_t>(ball.faces.size()));
+        for (const auto& face : ball.faces) {
+            put(std::array<float, 3>{});
+            for (const std::int32_t corner : face) put(ball.vertices[static_cast<std::size_t>(corner)]);
+            put(std::uint16_t{0});
+        }
+    } else {
+        for (const auto& [x, y, z] : ball.vertices) out << "v " << x << ' ' << y << ' ' << z << '\n';
+        for (const auto& [a, b, c] : ball.faces) out << "f " << a + 1 << ' ' << b + 1 << ' ' << c + 1 << '\n';
+    }
 }
 
 TEST(StreamedSolids, FloodsOfClosedAndOpenModels) {
@@ -90,6 +116,18 @@ TEST(StreamedSolids, VotesOfClosedAndOpenModels) {
         .expect_equal(60);
     write_ball(folder / "m.ply", 0);
     two_ways{folder, folder / "m.ply", {"-r", "60", "--padding", "4", "--solid", "nonzero", "--vote"}}.expect_equal(60);
+}
+
+TEST(StreamedSolids, StlAndObj) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    write_ball(folder / "m.stl", 16);
+    two_ways{folder, folder / "m.stl", {"-r", "60", "--solid", "exterior", "--closing", "2", "-t", "count,triangle"}}
+        .expect_equal(60);
+    if (!VOXELPIPE_TOOL_HAS_ASSIMP) return;
+    write_ball(folder / "m.obj", 60);
+    two_ways{folder, folder / "m.obj", {"-r", "60", "--solid", "nonzero", "--vote", "-t", "occupancy,depth"}}
+        .expect_equal(72);
 }
 
 // Several parts, of which one mirrors, and colours.
