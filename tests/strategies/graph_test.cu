@@ -296,9 +296,11 @@ void compare_without_larger(const Shader& shader, bool fails, int num_draws, boo
                 std::vector<unsigned char> pattern(vp::get<0>(fb).to_host(be).size() *
                                                    sizeof(*vp::get<0>(fb).view().elements));
                 for (std::size_t i = 0; i < pattern.size(); ++i) pattern[i] = i % 4 == 1 ? 0x21 : 0;
-                ASSERT_EQ(cudaMemcpy(const_cast<void*>(static_cast<const void*>(vp::get<0>(fb).view().elements)),
-                                     pattern.data(), pattern.size(), cudaMemcpyHostToDevice),
+                // In the stream of the calls: cudaMemcpy may return before the device has the data.
+                ASSERT_EQ(cudaMemcpyAsync(const_cast<void*>(static_cast<const void*>(vp::get<0>(fb).view().elements)),
+                                          pattern.data(), pattern.size(), cudaMemcpyHostToDevice, be.stream),
                           cudaSuccess);
+                ASSERT_EQ(cudaStreamSynchronize(be.stream), cudaSuccess);
                 if (loads) vp::get<0>(fb).load();
             };
             vp::framebuffer<vp::cuda_backend, Target> expected{be, g.extent}, fb{be, g.extent};
