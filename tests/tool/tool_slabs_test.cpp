@@ -96,7 +96,7 @@ void expect_same_group(const tower& t, const std::string& a, const std::string& 
 }
 
 TEST(ToolSlabs, ProcessesShareOneModel) {
-    const tower t({"-t", "occupancy,count,normal,color", "--sparse", "--padding", "2"});
+    const tower t({"-t", "occupancy,count,normal,color,color-outer", "--sparse", "--padding", "2"});
     ASSERT_EQ(0, t.draw("whole.zarr", {}).code);
     for (const char* const rank : {"1", "2", "0"}) {
         const outcome part = t.draw("parts.zarr", {"--world-size", "3", "--rank", rank});
@@ -217,8 +217,7 @@ TEST(ToolSlabs, PiecesOfPvti) {
 }
 
 TEST(ToolSlabs, SolidsAndTheirHoles) {
-    const tower t(
-        {"-t", "occupancy,color", "--solid", "nonzero", "--close-holes", "--fill-color", "#d9a066", "--sparse"});
+    const tower t({"-t", "occupancy,color", "--solid", "nonzero", "--close-holes", "--sparse"});
     ASSERT_EQ(0, t.draw("whole.zarr", {}).code);
     const outcome parts = t.draw("parts.zarr", {"--resume"});
     EXPECT_EQ(0, parts.code) << parts.err;

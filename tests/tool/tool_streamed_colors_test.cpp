@@ -125,6 +125,8 @@ TEST(StreamedColors, SharedSlabs) {
         how.insert(how.end(), rule.begin(), rule.end());
         expect_same_pieces({folder, folder / "m.glb", how}, {});
     }
+    gltf_test::lined_world().write_glb(folder / "m.glb");
+    expect_same_pieces({folder, folder / "m.glb", {"-r", "60", "-t", colors}}, {});
     if (!VOXELPIPE_TOOL_HAS_ASSIMP) return;
     write_balls(folder / "m.ply", 230);
     expect_same_pieces({folder, folder / "m.ply", {"-r", "60", "-t", colors, "--solid", "nonzero"}},
