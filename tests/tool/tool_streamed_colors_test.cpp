@@ -138,11 +138,11 @@ TEST(StreamedColors, GridsThatDoNotFit) {
     if (sanitized) return;
     const scratch_folder folder;
     builder file;
-    gltf_test::add_cube(file, {0, 0, 0}, 1, gltf_test::add_material(file, {0.9, 0.2, 0.1, 1}));
-    gltf_test::add_cube(file, {0.4, 0.4, 0.7}, 0.2, gltf_test::add_material(file, {0.1, 0.2, 0.9, 1}));
+    gltf_test::add_cube(file, {0, 0, 0}, 0.1, gltf_test::add_material(file, {0.9, 0.2, 0.1, 1}));
+    gltf_test::add_cube(file, {0.9, 0.8, 0.95}, 0.05, gltf_test::add_material(file, {0.1, 0.2, 0.9, 1}));
     file.write_glb(folder / "m.glb");
-    const two_ways solid{folder, folder / "m.glb", {"-r", "460", "-t", "color", "--solid", "exterior"}};
-    const outcome tight = solid.draw("tight.nvdb", {"--sparse", "--max-memory", "96"}),
+    const two_ways solid{folder, folder / "m.glb", {"-r", "400", "-t", "color", "--solid", "exterior"}};
+    const outcome tight = solid.draw("tight.nvdb", {"--sparse", "--max-memory", "52"}),
                   free = solid.draw("free.nvdb", {"--sparse"});
     ASSERT_EQ(0, tight.code) << tight.err;
     ASSERT_EQ(0, free.code) << free.err;
