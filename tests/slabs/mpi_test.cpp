@@ -134,82 +134,148 @@ TEST_P(Ranks, SparseSlabsAreCropsOfTheWhole) {
     EXPECT_EQ(sum_of_ranks(voxels), expected.num_voxels());
 }
 
-// Solids of meshes with holes, whose triangles the ranks have read in shares; of a crop, too.
-TEST(RankSolids, RepairedSlabsAreTheWhole) {
-    struct winding {
-        auto operator()(const vp::solid_fragment& f) const {
-            return vp::outputs(static_cast<std::int32_t>(f.winding + f.voxel.z + 100));
-        }
-    };
-    using targets = vp::framebuffer<backend_type, vp::target<std::int32_t, vp::blend::add>>;
-    using solid_stream = slabs::mpi_stream<backend_type, vp::passthrough>;
+struct winding {
+    auto operator()(const vp::solid_fragment& f) const {
+        return vp::outputs(static_cast<std::int32_t>(f.winding + f.voxel.z + 100));
+    }
+};
+using solid_targets = vp::framebuffer<backend_type, vp::target<std::int32_t, vp::blend::add>>;
+using solid_stream = slabs::mpi_stream<backend_type, vp::passthrough>;
+
+// A solid in one call, and in slabs of ranks whose triangles they have read in shares.
+struct rank_solid {
+    unit::small_mesh mesh;
+    vp::grid grid;
+    vp::solid_options how;
     backend_type backend = unit::make_backend(1);
-    const vp::grid uncut = unit::unit_grid(extent);
-    struct drawing {
-        vp::grid grid;
-        unit::small_mesh mesh;
-        std::uint64_t memory;
-    };
-    for (const drawing& d : {drawing{uncut, broken_scene(extent), std::uint64_t{1} << 30},
-                             {uncut, broken_scene(extent), 120'000},
-                             {uncut, plates(extent), std::uint64_t{1} << 30},
-                             {uncut.crop({3, 5, 9}, {30, 21, 22}), broken_scene(extent), 120'000}})
-        for (const vp::solid_options& how :
-             {vp::solid_options{}, vp::solid_options{.repair = vp::repair::close_holes},
-              vp::solid_options{
-                  .extent = vp::solid_extent::outer, .repair = vp::repair::close_holes, .max_hole_edges = 3},
-              vp::solid_options{.repair = vp::repair::vote}}) {
-            const vp::grid& grid = d.grid;
-            const unit::small_mesh& mesh = d.mesh;
-            targets whole{backend, grid.extent};
-            const vp::status one =
-                vp::voxelize_solid(backend, mesh.view(), grid, vp::passthrough{}, winding{}, whole, how);
-            ASSERT_TRUE(one.ok()) << one.message();
-            const auto expected = vp::get<0>(whole).to_host_target(backend);
-            slabs::stream_options options;
-            options.memory = d.memory;
-            options.folder = ::testing::TempDir();
-            options.is_solid = true;
-            options.repair = how.repair;
-            solid_stream stream(MPI_COMM_WORLD, backend, grid, {}, options);
-            const auto [first, last] = slabs::share_of(mesh.triangles.size(), my_rank(), num_ranks());
-            stream.add({mesh.positions, vp::array_view<const glm::uvec3>(mesh.triangles.data() + first, last - first)})
-                .or_throw();
-            std::uint64_t wrong = 0, voxels = 0;
-            const vp::status s = stream.draw_solid(
-                winding{},
-                [&](glm::ivec3 size) {
-                    return targets{backend, size};
-                },
-                [&](const slabs::slab& slab, const targets& fb) {
-                    const auto part = vp::get<0>(fb).to_host_target(backend);
-                    const glm::ivec3 o = slab.where.offset - grid.offset;
-                    unit::for_each_voxel(slab.where.extent, [&](int x, int y, int z) {
-                        wrong += part(x, y, z) != expected(o.x + x, o.y + y, o.z + z) ? 1 : 0;
-                        ++voxels;
-                    });
-                },
-                how);
-            EXPECT_TRUE(s.ok()) << s.message();
-            EXPECT_EQ(s.counts, one.counts);
-            EXPECT_EQ(s.solid, one.solid);
-            EXPECT_EQ(wrong, 0u);
-            EXPECT_EQ(sum_of_ranks(voxels), static_cast<std::uint64_t>(grid.extent.x) *
-                                                static_cast<std::uint64_t>(grid.extent.y) *
-                                                static_cast<std::uint64_t>(grid.extent.z));
+    solid_targets whole{backend, grid.extent};
+    vp::status one = vp::voxelize_solid(backend, mesh.view(), grid, vp::passthrough{}, winding{}, whole, how);
+    vp::host_target<vp::target<std::int32_t, vp::blend::add>> expected = vp::get<0>(whole).to_host_target(backend);
+
+    // Returns the slabs of the ranks.
+    slabs::plan expect_ranks(std::uint64_t memory) {
+        EXPECT_TRUE(one.ok()) << one.message();
+        solid_stream stream(MPI_COMM_WORLD, backend, grid, {}, options(memory));
+        const auto [first, last] = slabs::share_of(mesh.triangles.size(), my_rank(), num_ranks());
+        stream.add({mesh.positions, vp::array_view<const glm::uvec3>(mesh.triangles.data() + first, last - first)})
+            .or_throw();
+        std::uint64_t wrong = 0, voxels = 0;
+        const vp::status s = draw(stream, [&](const slabs::slab& slab, const solid_targets& fb) {
+            const auto part = vp::get<0>(fb).to_host_target(backend);
+            const glm::ivec3 o = slab.where.offset - grid.offset;
+            unit::for_each_voxel(slab.where.extent, [&](int x, int y, int z) {
+                wrong += part(x, y, z) != expected(o.x + x, o.y + y, o.z + z) ? 1 : 0;
+                ++voxels;
+            });
+        });
+        EXPECT_TRUE(s.ok()) << s.message();
+        EXPECT_EQ(s.counts, one.counts);
+        EXPECT_EQ(s.solid, one.solid);
+        EXPECT_EQ(wrong, 0u);
+        EXPECT_EQ(sum_of_ranks(voxels), static_cast<std::uint64_t>(grid.extent.x) *
+                                            static_cast<std::uint64_t>(grid.extent.y) *
+                                            static_cast<std::uint64_t>(grid.extent.z));
+        return stream.slabs();
+    }
+    template <class Sink>
+    vp::status draw(solid_stream& stream, const Sink& sink) {
+        return stream.draw_solid(
+            winding{},
+            [&](glm::ivec3 size) {
+                return solid_targets{backend, size};
+            },
+            sink, how);
+    }
+    [[nodiscard]] slabs::stream_options options(std::uint64_t memory) const {
+        slabs::stream_options o;
+        o.memory = memory;
+        o.folder = ::testing::TempDir();
+        o.is_solid = true;
+        o.repair = how.repair;
+        return o;
+    }
+};
+constexpr std::uint64_t much = std::uint64_t{1} << 30, little = 120'000;
+
+// Meshes with holes; of a crop, too.
+TEST(RankSolids, RepairedSlabsAreTheWhole) {
+    const vp::grid uncut = unit::unit_grid(extent), crop = uncut.crop({3, 5, 9}, {30, 21, 22});
+    for (const vp::solid_options& how :
+         {vp::solid_options{}, vp::solid_options{.repair = vp::repair::close_holes},
+          vp::solid_options{.extent = vp::solid_extent::outer, .repair = vp::repair::close_holes, .max_hole_edges = 3},
+          vp::solid_options{.repair = vp::repair::vote}}) {
+        rank_solid broken{broken_scene(extent), uncut, how};
+        (void)broken.expect_ranks(much);
+        (void)broken.expect_ranks(little);
+        (void)rank_solid{plates(extent), uncut, how}.expect_ranks(much);
+        (void)rank_solid{broken_scene(extent), crop, how}.expect_ranks(little);
+    }
+}
+
+// Grids of odd sizes, the last two of which have fewer layers than ranks: slabs thinner than `closing`, and none.
+TEST(RankSolids, FloodedSlabsAreTheWhole) {
+    std::uint64_t voxels = 0;
+    bool any_without = false;
+    for (const glm::ivec3& size : {extent, glm::ivec3(65, 7, 11), glm::ivec3(70, 9, 3), glm::ivec3(8, 64, 1)})
+        for (const int closing : {0, 1, 3}) {
+            SCOPED_TRACE(std::to_string(size.z) + " layers, closing " + std::to_string(closing));
+            const vp::solid_options how{.repair = vp::repair::exterior, .closing = closing};
+            rank_solid broken{broken_scene(size), unit::unit_grid(size), how};
+            voxels += broken.one.counts.voxels;
+            for (const slabs::layer_range& r : broken.expect_ranks(little).slabs) any_without |= r.size() == 0;
+            if (closing != 1) continue;
+            (void)broken.expect_ranks(much);
+            (void)rank_solid{plates(size), broken.grid, how}.expect_ranks(much);
+            (void)rank_solid{{}, broken.grid, how}.expect_ranks(much);
         }
-    slabs::stream_options flood;
-    flood.repair = vp::repair::exterior;
-    solid_stream refused(MPI_COMM_WORLD, backend, uncut, {}, flood);
-    EXPECT_EQ(refused
-                  .draw_solid(
-                      winding{},
-                      [&](glm::ivec3 size) {
-                          return targets{backend, size};
-                      },
-                      [](const slabs::slab&, const targets&) { FAIL(); }, {.repair = vp::repair::exterior})
-                  .code,
-              vp::status_code::crop_without_whole);
+    EXPECT_GT(voxels, 50'000u);
+    EXPECT_TRUE(any_without || num_ranks() == 1);
+}
+
+// A box with walls across x, which leave a gap above and below in turns: a path from the open end goes up and down
+// through all slabs, six times. The last wall has no gap.
+TEST(RankSolids, FloodsWindThroughAllRanks) {
+    const glm::ivec3 size(51, 13, 43);
+    unit::small_mesh m;
+    // In strips, so that slabs have about equal work.
+    const auto across_x = [&](float x, float low, float high) {
+        for (float z = low; z < high; ++z)
+            add_quad(m, {x, 2.5f, z}, {x, 10.5f, z}, {x, 10.5f, z + 1}, {x, 2.5f, z + 1});
+    };
+    for (const float y : {2.5f, 10.5f})
+        for (float z = 2.5f; z < 39; ++z) add_quad(m, {2.5f, y, z}, {47.5f, y, z}, {47.5f, y, z + 1}, {2.5f, y, z + 1});
+    add_quad(m, {8.5f, 2.5f, 2.5f}, {47.5f, 2.5f, 2.5f}, {47.5f, 10.5f, 2.5f}, {8.5f, 10.5f, 2.5f});
+    add_quad(m, {2.5f, 2.5f, 39.5f}, {47.5f, 2.5f, 39.5f}, {47.5f, 10.5f, 39.5f}, {2.5f, 10.5f, 39.5f});
+    for (int k = 0; k < 8; ++k) {
+        const bool full = k == 0 || k >= 6;
+        across_x(2.5f + 6 * static_cast<float>(k), full || k % 2 == 1 ? 2.5f : 8.5f,
+                 full || k % 2 == 0 ? 39.5f : 33.5f);
+    }
+    add_quad(m, {47.5f, 2.5f, 2.5f}, {47.5f, 10.5f, 2.5f}, {47.5f, 10.5f, 39.5f}, {47.5f, 2.5f, 39.5f});
+    for (const int closing : {0, 1, 3}) {
+        SCOPED_TRACE(closing);
+        rank_solid box{m, unit::unit_grid(size), {.repair = vp::repair::exterior, .closing = closing}};
+        for (int k = 0; k < 6; ++k) EXPECT_EQ(box.expected(5 + 6 * k, 6, 20) != 0, closing == 3) << k;
+        EXPECT_NE(box.expected(41, 6, 20), 0);
+        for (const slabs::layer_range& r : box.expect_ranks(little).slabs) EXPECT_GT(r.size(), 6);
+    }
+}
+
+TEST(RankSolids, SaysWhatIsWrong) {
+    const vp::grid uncut = unit::unit_grid(extent);
+    const auto code = [](const vp::grid& grid, vp::repair of_stream, const vp::solid_options& how) {
+        rank_solid solid{broken_scene(extent), grid, how};
+        slabs::stream_options options = solid.options(much);
+        options.repair = of_stream;
+        solid_stream stream(MPI_COMM_WORLD, solid.backend, grid, {}, options);
+        return solid.draw(stream, [](const slabs::slab&, const solid_targets&) { FAIL(); }).code;
+    };
+    using vp::status_code;
+    const vp::solid_options flood{.repair = vp::repair::exterior};
+    EXPECT_EQ(code(uncut.crop({0, 0, 1}, {9, 9, 9}), vp::repair::exterior, flood), status_code::crop_without_whole);
+    EXPECT_EQ(code(uncut, vp::repair::none, flood), status_code::bad_solid_options) << "the stream was told of none";
+    EXPECT_EQ(code(uncut, vp::repair::exterior, {.repair = vp::repair::exterior, .closing = 65}),
+              status_code::bad_solid_options);
 }
 
 TEST_P(Ranks, AFailureOfOneRankEndsTheCallOnAll) {

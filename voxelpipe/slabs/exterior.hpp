@@ -5,16 +5,19 @@
 // repair::exterior of a grid whose bits do not fit into memory. The walls are kept as bricks, on disk beyond a budget;
 // the flood goes slab by slab, up and down, and passes from one to the next through their faces, until none gets news.
 // What it reaches is a set, so the order does not show: the bits are those of a flood of the whole grid. A path that
-// winds up and down takes as many sweeps as it has turns. Needs POSIX files.
+// winds up and down takes as many sweeps as it has turns. Several machines may have a part of the grid each, and tell
+// each other of their borders (mpi_exterior.hpp). Needs POSIX files.
 
 #include <voxelpipe/core/bit_grid.hpp>
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/slabs/bins.hpp>
+#include <voxelpipe/slabs/plan.hpp>
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,12 +28,17 @@ namespace voxelpipe::slabs {
 class slab_exterior {
 public:
     // extent: of the whole grid, in voxels. closing: as solid_options has it. budget: bytes that may be held, about;
-    // four layers of bits for each of its slabs, which are never thinner than 8 layers, come on top. folder: for a
+    // four layers of bits for each of its slabs, which begin at multiples of 8 layers, come on top. folder: for a
     // temporary file. threads: at least 1.
     slab_exterior(glm::ivec3 extent, int closing, std::uint64_t budget, std::string folder, unsigned threads)
+        : slab_exterior(extent, closing, budget, std::move(folder), threads, {0, extent.z}) {}
+    // The same for a part of the grid, not empty: its layers [begin, end) along z.
+    slab_exterior(glm::ivec3 extent, int closing, std::uint64_t budget, std::string folder, unsigned threads,
+                  layer_range part)
         : extent_(extent), padded_(extent + 2 * (closing + 1)), closing_(closing), threads_(threads),
-          depth_(depth_for(budget / 2)), slabs_(static_cast<std::size_t>((extent.z + depth_ - 1) / depth_)),
-          bins_(slabs_.size()), walls_(budget / 2, bins_.size(), std::move(folder)) {}
+          part_(layers_of(extent, closing, part)), depth_(depth_for(budget / 2)), first_slab_(part.begin / depth_),
+          slabs_(static_cast<std::size_t>((part.end + depth_ - 1) / depth_ - first_slab_)), bins_(slabs_.size()),
+          walls_(budget / 2, bins_.size(), std::move(folder)) {}
     // Bytes that are held for a budget, at least.
     [[nodiscard]] static double least_bytes(glm::ivec3 extent, int closing) {
         const int layers = 5 * brick + 2 * closing + 4 * ((extent.z + brick - 1) / brick);
@@ -44,13 +52,10 @@ public:
     // Voxels of the conservative cover, without tiles: of the whole grid or a crop of it. In any order; bricks may come
     // in parts.
     void add_walls(const brick_table& cover) {
-        for (std::uint64_t b = 0; b < cover.count; ++b) {
-            const glm::ivec3 at = core::morton_position(cover.keys[b]);
-            walls_.push(bins_, static_cast<std::size_t>(at.z * brick / depth_), {cover.keys[b], cover.masks[b]});
-        }
+        for (std::uint64_t b = 0; b < cover.count; ++b) add({cover.keys[b], cover.masks[b]});
     }
 
-    // Finds what is outside. All walls are there.
+    // Finds what is outside, in a part from what is known of the others. All walls are there.
     void flood() {
         for (bool any = true; any;) {
             any = false;
@@ -64,12 +69,12 @@ public:
         const int ring = closing_ + 1, low = begin.z + ring, high = low + size.z; // padded layers
         const int first = std::max(0, low - closing_), last = std::min(padded_.z, high + closing_);
         core::bit_grid outside({padded_.x, padded_.y, last - first});
-        for (std::size_t s = 0; s < slabs_.size(); ++s) {
-            const int from = std::max(first, first_layer(s)), to = std::min(last, last_layer(s));
-            if (from >= to) continue;
-            const core::bit_grid& reached = reached_in(s);
-            for (int z = from; z < to; ++z) copy_layer(reached, z - first_layer(s), outside, z - first);
-        }
+        visit_outside({first, last}, [&](int z, const std::uint64_t* bits) {
+            std::copy_n(bits, layer_words(extent_, closing_), outside.row(0, z - first));
+        });
+        for (const auto& [z, bits] : beyond_)
+            if (z >= first && z < last)
+                std::copy_n(bits.data(), layer_words(extent_, closing_), outside.row(0, z - first));
         core::dilate(outside, closing_, threads_);
         core::bit_grid result(size);
         for (int z = 0; z < size.z; ++z)
@@ -82,12 +87,67 @@ public:
         return result;
     }
 
-private:
-    static constexpr int brick = core::sparse_brick_size;
+    // ---- for several machines, each of which has a part of the grid ----
+    //
+    // Layers count from the lowest one around the grid. Each part takes the walls within `closing` layers around it,
+    // then what its neighbours reach beside it, until none gets news, and before inside() what is outside within
+    // `closing` layers around it.
+
     struct wall_brick {
-        std::uint64_t key;
+        std::uint64_t key; // as in brick_table
         brick_mask mask;
     };
+    // The layers of a part, with those around the grid at its ends; none of an empty one.
+    [[nodiscard]] static layer_range layers_of(glm::ivec3 extent, int closing, layer_range part) {
+        if (part.size() == 0) return {};
+        const int ring = closing + 1;
+        return {part.begin == 0 ? 0 : part.begin + ring, part.end == extent.z ? part.end + 2 * ring : part.end + ring};
+    }
+    // Words of a layer of bits, in rows along x.
+    [[nodiscard]] static std::size_t layer_words(glm::ivec3 extent, int closing) {
+        const glm::ivec3 padded = extent + 2 * (closing + 1);
+        return (static_cast<std::size_t>(padded.x) + 63) / 64 * static_cast<std::size_t>(padded.y);
+    }
+    // Calls visit(wall_brick) for the bricks that have come and meet some layers, before others' are taken.
+    template <class Visit>
+    void visit_walls(layer_range layers, const Visit& visit) const {
+        for (const bin<wall_brick>& b : bins_)
+            b.for_each_block([&](std::span<const wall_brick> bricks) {
+                for (const wall_brick& wall : bricks) {
+                    const int first = core::morton_position(wall.key).z * brick + closing_ + 1;
+                    if (first < layers.end && first + brick > layers.begin) visit(wall);
+                }
+            });
+    }
+    // Walls of another part.
+    void take_walls(std::span<const wall_brick> bricks) {
+        for (const wall_brick& wall : bricks) add(wall);
+    }
+    // After flood(): what is reached in the lowest layer of the part (end 0) or in its highest one (end 1).
+    [[nodiscard]] std::span<const std::uint64_t> reached_at(int end) const {
+        return end == 0 ? slabs_.front().reached[0] : slabs_.back().reached[1];
+    }
+    // What another part reaches in the layer below this one (end 0) or above it (end 1). True if flood() has more to
+    // do.
+    [[nodiscard]] bool take_reached(int end, std::span<const std::uint64_t> reached) {
+        beside_[end].assign(reached.begin(), reached.end());
+        return has_news(end == 0 ? 0 : slabs_.size() - 1);
+    }
+    // After all floods: calls visit(z, words) for the outside in those of some layers that are this part's, upwards.
+    template <class Visit>
+    void visit_outside(layer_range layers, const Visit& visit) {
+        for (std::size_t s = 0; s < slabs_.size(); ++s) {
+            const int from = std::max(layers.begin, first_layer(s)), to = std::min(layers.end, last_layer(s));
+            if (from >= to) continue;
+            const core::bit_grid& reached = reached_in(s);
+            for (int z = from; z < to; ++z) visit(z, reached.row(0, z - first_layer(s)));
+        }
+    }
+    // The outside in a layer of another part.
+    void take_outside(int z, std::span<const std::uint64_t> bits) { beyond_[z].assign(bits.begin(), bits.end()); }
+
+private:
+    static constexpr int brick = core::sparse_brick_size;
     using face = std::vector<std::uint64_t>; // a layer of bits
     // The lowest and the highest layer of a slab: what has been reached, and what is open and has not.
     struct slab_faces {
@@ -110,14 +170,15 @@ private:
     }
     // Layers count from the lowest one around the grid; the slabs at the ends have those around it.
     [[nodiscard]] int first_layer(std::size_t s) const {
-        return s == 0 ? 0 : static_cast<int>(s) * depth_ + closing_ + 1;
+        return s == 0 ? part_.begin : (first_slab_ + static_cast<int>(s)) * depth_ + closing_ + 1;
     }
     [[nodiscard]] int last_layer(std::size_t s) const {
-        return s + 1 == slabs_.size() ? padded_.z : first_layer(s + 1);
+        return s + 1 == slabs_.size() ? part_.end : first_layer(s + 1);
     }
-    static void copy_layer(const core::bit_grid& from, int at, core::bit_grid& to, int to_at) {
-        const std::size_t words = from.words() * static_cast<std::size_t>(from.extent().y);
-        std::copy_n(from.row(0, at), words, to.row(0, to_at));
+    // Walls beyond a part lie with those of its end.
+    void add(const wall_brick& wall) {
+        const int s = core::morton_position(wall.key).z * brick / depth_ - first_slab_;
+        walls_.push(bins_, static_cast<std::size_t>(std::clamp(s, 0, static_cast<int>(bins_.size()) - 1)), wall);
     }
 
     // The walls of a slab, grown by `closing`.
@@ -154,11 +215,16 @@ private:
     // What is reached in a slab from around the grid and from its neighbours, as far as these are known.
     [[nodiscard]] core::bit_grid flooded(std::size_t s, const core::bit_grid& walls) const {
         core::bit_grid reached(walls.extent());
-        core::set_faces(reached, s == 0, s + 1 == slabs_.size());
-        if (s > 0) enter(slabs_[s - 1].reached[1], walls, reached, 0);
-        if (s + 1 < slabs_.size()) enter(slabs_[s + 1].reached[0], walls, reached, walls.extent().z - 1);
+        core::set_faces(reached, first_layer(s) == 0, last_layer(s) == padded_.z);
+        enter(reached_beside(s, 0), walls, reached, 0);
+        enter(reached_beside(s, 1), walls, reached, walls.extent().z - 1);
         core::spread(walls, reached);
         return reached;
+    }
+    // What is reached in the layer below a slab (end 0) or above it (end 1); empty if nothing is there or known.
+    [[nodiscard]] const face& reached_beside(std::size_t s, int end) const {
+        if (end == 0) return s == 0 ? beside_[0] : slabs_[s - 1].reached[1];
+        return s + 1 == slabs_.size() ? beside_[1] : slabs_[s + 1].reached[0];
     }
     static void enter(const face& from, const core::bit_grid& walls, core::bit_grid& reached, int z) {
         const std::uint64_t* const w = walls.row(0, z);
@@ -174,14 +240,13 @@ private:
                 if ((reached[i] & left[i]) != 0) return true;
             return false;
         };
-        return (s > 0 && meets(slabs_[s - 1].reached[1], slabs_[s].left[0])) ||
-               (s + 1 < slabs_.size() && meets(slabs_[s + 1].reached[0], slabs_[s].left[1]));
+        return meets(reached_beside(s, 0), slabs_[s].left[0]) || meets(reached_beside(s, 1), slabs_[s].left[1]);
     }
     bool visit_if_needed(std::size_t s) {
         if (!has_news(s)) return false;
         ++visits_;
         const core::bit_grid walls = walls_of(s), reached = flooded(s, walls);
-        const std::size_t words = walls.words() * static_cast<std::size_t>(padded_.y);
+        const std::size_t words = layer_words(extent_, closing_);
         for (const int end : {0, 1}) {
             const int z = end == 0 ? 0 : walls.extent().z - 1;
             const std::uint64_t *const w = walls.row(0, z), *const r = reached.row(0, z);
@@ -204,8 +269,12 @@ private:
     glm::ivec3 extent_, padded_; // the grid, and that with what lies around it
     int closing_;
     unsigned threads_;
-    int depth_; // layers of the grid a slab, a multiple of a brick's
+    layer_range part_; // with what lies around the grid
+    int depth_;        // layers of the grid a slab, a multiple of a brick's
+    int first_slab_;   // number in the whole grid
     std::vector<slab_faces> slabs_;
+    face beside_[2];             // what other parts reach below and above
+    std::map<int, face> beyond_; // layers of other parts
     std::vector<bin<wall_brick>> bins_;
     bin_memory<wall_brick> walls_;
     std::uint64_t visits_ = 0;

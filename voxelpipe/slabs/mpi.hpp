@@ -13,15 +13,8 @@
 //
 // The program calls MPI_Init before and MPI_Finalize after. An MPI error ends the program, as MPI does by default.
 
+#include <voxelpipe/slabs/mpi_exterior.hpp>
 #include <voxelpipe/slabs/stream.hpp>
-
-#ifndef MPICH_SKIP_MPICXX
-#define MPICH_SKIP_MPICXX 1
-#endif
-#ifndef OMPI_SKIP_MPICXX
-#define OMPI_SKIP_MPICXX 1
-#endif
-#include <mpi.h>
 
 #include <algorithm>
 #include <array>
@@ -88,13 +81,19 @@ public:
         constexpr bool lists = detail::is_abuffer<std::remove_cvref_t<decltype(make(grid_.extent))>>;
         return draw_with(!lists, nullptr, [&](auto& stream) { return stream.draw(shader, make, sink); });
     }
-    // Every rank. As stream::draw_solid, with close_holes and vote; exterior is refused (crop_without_whole). On top of
-    // what that holds, every rank holds the edges that the triangles of each rank leave open, 56 bytes each: those of
-    // the holes, and of the borders between what the ranks have read.
+    // Every rank. As stream::draw_solid, with every repair. On top of what that holds for a rank's slab:
+    //   close_holes   the edges that the triangles of each rank leave open, 56 bytes each, on every rank: those of the
+    //                 holes, and of the borders between what the ranks have read
+    //   exterior      four layers of bits; with `closing` r the bits and walls of 2 r more layers, and as much again
+    //                 while they are sent, more if other slabs are thinner than r
     template <class SolidShader, class Make, class Sink>
     [[nodiscard]] status draw_solid(const SolidShader& shader, const Make& make, const Sink& sink,
                                     const solid_options& how = {}) {
-        if (how.repair == repair::exterior) return core::failure(status_code::crop_without_whole);
+        if (how.repair == repair::exterior) {
+            if (options_.repair != how.repair || how.slab != nullptr)
+                return core::failure(status_code::bad_solid_options);
+            if (const status s = core::validate(how, grid_); !s.ok()) return s;
+        }
         return draw_with(false, &how, [&](auto& stream) { return stream.draw_solid(shader, make, sink, how); });
     }
 
@@ -150,21 +149,32 @@ private:
         if (solid != nullptr && repairs_->columns()) join_columns(received, attempt, all_ok);
         if (!all_ok()) return finish(own, thrown);
 
-        status drawn;
+        const bool floods = solid != nullptr && solid->repair == repair::exterior;
+        std::optional<record_stream<Backend, varyings>> stream; // none if there is no layer
         attempt([&] {
             if (plan_.slabs[static_cast<std::size_t>(rank_)].size() == 0) return;
-            record_stream<Backend, varyings> stream(backend_, plan_.crop(grid_, static_cast<std::size_t>(rank_)),
-                                                    options_);
-            if (plan_.axis != 2) stream.cut_into(equal_layers(stream.where(), plan_.axis, 1));
-            feed(stream, received);
-            if (stream.repairs().holes()) stream.repairs().take(std::move(cones), grid_);
-            if (stream.repairs().columns()) {
-                column_sweep &from = *repairs_->columns(), &to = *stream.repairs().columns();
+            stream.emplace(backend_, plan_.crop(grid_, static_cast<std::size_t>(rank_)), options_);
+            if (plan_.axis != 2) stream->cut_into(equal_layers(stream->where(), plan_.axis, 1));
+            feed(*stream, received);
+            solid_repairs& repairs = stream->repairs();
+            if (repairs.holes()) repairs.take(std::move(cones), grid_);
+            if (repairs.columns()) {
+                column_sweep &from = *repairs_->columns(), &to = *repairs.columns();
                 std::copy(from.open().begin(), from.open().end(), to.open().begin());
                 std::copy(from.below().begin(), from.below().end(), to.below().begin());
             }
             repairs_.reset();
-            drawn = draw(stream);
+            if (floods) own = stream->find_walls(*solid);
+        });
+        if (!all_ok()) return finish(own, thrown);
+        if (floods) {
+            slab_exterior* const part = stream ? &*stream->repairs().exterior() : nullptr;
+            detail::rank_flood(comm_, grid_.extent, solid->closing, plan_).run(part, attempt, all_ok);
+            if (!all_ok()) return finish(own, thrown);
+        }
+        status drawn;
+        attempt([&] {
+            if (stream) drawn = draw(*stream);
             if (!drawn.ok()) own = drawn;
         });
         if (!all_ok()) return finish(own, thrown);

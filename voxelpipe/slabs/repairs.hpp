@@ -52,7 +52,8 @@ void for_each_snapped(const bin<record<Varyings>>& triangles, const grid& g, con
 // The repair of one body. Members throw std::bad_alloc, and std::system_error of files.
 class solid_repairs {
 public:
-    // g: that all slabs together are, a crop or not. budget: bytes for the search, about; folder: for temporary files.
+    // g: that all slabs together are, a crop or not; for exterior layers of a grid, see exterior(). budget: bytes for
+    // the search, about; folder: for temporary files.
     solid_repairs(const grid& g, repair kind, std::uint64_t budget, std::string folder, unsigned threads)
         : grid_(g), kind_(kind), budget_(budget), folder_(std::move(folder)), threads_(threads) {
         if (kind == repair::close_holes) holes_.emplace(0, budget, folder_);
@@ -82,7 +83,9 @@ public:
                 return core::failure(status_code::too_many_triangles, stage::coarse_raster);
             }
         }
-        if (needs_walls()) exterior_.emplace(grid_.extent, how.closing, budget_, folder_, threads_);
+        if (needs_walls())
+            exterior_.emplace(grid_.whole_extent(), how.closing, budget_, folder_, threads_,
+                              layer_range{grid_.offset.z, grid_.offset.z + grid_.extent.z});
         return {};
     }
     // The conservative cover of a slab; see slab_exterior.
@@ -111,7 +114,7 @@ public:
         if (columns_) bits_ = columns_->bits();
         if (exterior_) {
             inside_.reset();
-            inside_ = exterior_->inside(slab.offset - grid_.offset, slab.extent);
+            inside_ = exterior_->inside(slab.offset, slab.extent);
             bits_.inside = inside_->data();
         }
         how.slab = &bits_;
@@ -140,6 +143,8 @@ public:
     }
     // The columns of a vote; of this grid from its lowest layer on, until enter().
     [[nodiscard]] std::optional<column_sweep>& columns() { return columns_; }
+    // The flood, from begin() on; with all layers of this grid's walls it still lacks those of other parts.
+    [[nodiscard]] std::optional<slab_exterior>& exterior() { return exterior_; }
 
 private:
     grid grid_;

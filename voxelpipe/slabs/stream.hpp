@@ -119,6 +119,15 @@ public:
             chunk.visit_snapped([&](const auto& a, const auto& b, const auto& c) { repairs_.add(a, b, c); });
         return router_.route(chunk, count, slabs_, bins_, *memory_, counts_);
     }
+    // Before draw_solid with repair::exterior, of layers of a grid whose others are on other machines: draws the walls.
+    // Then the machines finish repairs().exterior() together. how: valid for the whole grid. Fails and throws as
+    // draw_solid.
+    [[nodiscard]] status find_walls(const solid_options& how) {
+        if (const status s = repairs_.begin(how); !s.ok()) return s;
+        enqueue(2);
+        has_walls_ = true;
+        return draw_walls();
+    }
     // Of stream_options::repair.
     [[nodiscard]] solid_repairs& repairs() { return repairs_; }
     // Threads that work on the host.
@@ -141,26 +150,28 @@ public:
     //   vote          three layers of bits of the grid
     //   exterior      four layers of bits for each 8 layers of the grid at most, 40 layers more and 2 for each voxel of
     //                 `closing` (slab_exterior::least_bytes), and the cover of a slab in bricks. A crop is refused, as
-    //                 by one call (crop_without_whole)
+    //                 by one call (crop_without_whole), unless find_walls came before
     template <class SolidShader, class Make, class Sink>
     [[nodiscard]] status draw_solid(const SolidShader& shader, const Make& make, const Sink& sink,
                                     const solid_options& how = {}) {
         if (!options_.is_solid || how.repair != options_.repair || how.slab != nullptr || how.cones != nullptr ||
             axis_ == 0 || (repairs_.is_along_z() && axis_ != 2))
             return core::failure(status_code::bad_solid_options);
-        if (const status s = core::validate(how, grid_); !s.ok()) return s;
+        if (!has_walls_)
+            if (const status s = core::validate(how, grid_); !s.ok()) return s;
         if (repairs_.is_along_z() && !core::takes_solid_slabs<Backend>)
             return core::failure(status_code::strategy_unavailable);
         try {
-            if (const status s = repairs_.begin(how); !s.ok()) return s;
-            // The flood has an eighth of the memory.
-            return draw_slabs<true>(shader, make, sink, how, repairs_.needs_walls() ? 0.625 : 0.75);
+            if (!has_walls_)
+                if (const status s = repairs_.begin(how); !s.ok()) return s;
+            return draw_slabs<true>(shader, make, sink, how, repairs_.needs_walls() ? share_beside_flood : 0.75);
         } catch (const std::bad_alloc&) {
             return core::failure(status_code::out_of_memory, stage::coarse_raster);
         }
     }
 
 private:
+    static constexpr double share_beside_flood = 0.625; // of the memory, an eighth of which the flood has
     using arrays = detail::slab_arrays<Varyings>;
     using queue_type = detail::slab_queue<Varyings>;
     using mesh_types = detail::slab_mesh<Varyings>;
@@ -177,17 +188,15 @@ private:
         using output = std::remove_cvref_t<decltype(make(grid_.extent))>;
         constexpr bool lists = detail::is_abuffer<output>;
         if (lists && axis_ != 2) return core::failure(status_code::bad_crop);
-        queue_type queue;
-        queue.start(options_, threads_, axis_, lists || repairs_.is_along_z() ? 2 : IsSolid ? 1 : 0);
-        for (std::size_t i = 0; i < parts_.size(); ++i) queue.push_back(parts_[i], std::move(bins_[i]));
-        bins_.clear();
-        parts_.clear();
+        if (!has_walls_) enqueue(lists || repairs_.is_along_z() ? 2 : IsSolid ? 1 : 0);
         if constexpr (IsSolid)
-            if (repairs_.needs_walls())
-                if (const status s = find_outside(queue, share); !s.ok()) return s;
+            if (repairs_.needs_walls() && !has_walls_) {
+                if (const status s = draw_walls(); !s.ok()) return s;
+                repairs_.flood();
+            }
         status all;
         const double voxel = detail::bytes_per_voxel<output> + repairs_.voxel_bytes();
-        const status s = queue.for_each(
+        const status s = queue_.for_each(
             detail::costs_of<Varyings>(options_, voxel, share), false,
             [&](const typename queue_type::entry& next, arrays triangles) {
                 slab part;
@@ -227,26 +236,32 @@ private:
         return all;
     }
 
+    // Puts the slabs into the queue. last_axis: that they may be cut along.
+    void enqueue(int last_axis) {
+        queue_.start(options_, threads_, axis_, last_axis);
+        for (std::size_t i = 0; i < parts_.size(); ++i) queue_.push_back(parts_[i], std::move(bins_[i]));
+        bins_.clear();
+        parts_.clear();
+    }
+
     // Draws the cover of all slabs, for the flood.
-    [[nodiscard]] status find_outside(queue_type& queue, double share) {
+    [[nodiscard]] status draw_walls() {
         using cover = sparse_framebuffer<Backend, target<bit, blend::bit_or>>;
         voxelize_options how;
         how.rule = coverage::conservative;
         how.count_voxels = false;
-        const status s = queue.for_each(detail::costs_of<Varyings>(options_, repairs_.voxel_bytes(), share), true,
-                                        [&](const typename queue_type::entry& next, arrays triangles) -> status {
-                                            if (triangles.numbers.size() == 0) return {};
-                                            cover out(backend_, next.where.extent);
-                                            const status drawn =
-                                                draw_one<false>(std::move(triangles), constant(true), next.where, out,
-                                                                [&](const auto& draws, const grid& g, auto& to) {
-                                                                    return voxelize(backend_, draws, g, to, how);
-                                                                });
-                                            if (drawn.ok()) repairs_.add_walls(out.to_host(backend_).table());
-                                            return drawn;
-                                        });
-        if (s.ok()) repairs_.flood();
-        return s;
+        return queue_.for_each(detail::costs_of<Varyings>(options_, repairs_.voxel_bytes(), share_beside_flood), true,
+                               [&](const typename queue_type::entry& next, arrays triangles) -> status {
+                                   if (triangles.numbers.size() == 0) return {};
+                                   cover out(backend_, next.where.extent);
+                                   const status drawn =
+                                       draw_one<false>(std::move(triangles), constant(true), next.where, out,
+                                                       [&](const auto& draws, const grid& g, auto& to) {
+                                                           return voxelize(backend_, draws, g, to, how);
+                                                       });
+                                   if (drawn.ok()) repairs_.add_walls(out.to_host(backend_).table());
+                                   return drawn;
+                               });
     }
 
     template <bool IsSolid, class Shader, class Output, class Call>
@@ -292,6 +307,8 @@ private:
     std::vector<grid> parts_;            // slabs to begin with, until they are drawn
     std::vector<bin<record_type>> bins_; // of these
     std::unique_ptr<bin_memory<record_type>> memory_;
+    queue_type queue_; // while they are drawn
+    bool has_walls_ = false;
 };
 
 namespace detail {
