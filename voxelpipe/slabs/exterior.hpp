@@ -93,9 +93,10 @@ public:
     // then what its neighbours reach beside it, until none gets news, and before inside() what is outside within
     // `closing` layers around it.
 
+    // Walls in a brick of 8^3 voxels.
     struct wall_brick {
         std::uint64_t key; // as in brick_table
-        brick_mask mask;
+        brick_mask mask;   // the voxels, in Morton order
     };
     // The layers of a part, with those around the grid at its ends; none of an empty one.
     [[nodiscard]] static layer_range layers_of(glm::ivec3 extent, int closing, layer_range part) {
