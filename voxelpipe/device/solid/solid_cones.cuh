@@ -54,16 +54,16 @@ template <class Mesh, class VertexShader, class SolidShader>
         std::vector<glm::uvec3> triangles;
     };
     const core::snap_transform snap = core::make_snap_transform(g);
-    std::vector<mesh_on_host> meshes;
-    for (std::size_t d = 0; d < draws.size(); ++d) {
+    std::vector<mesh_on_host> meshes(draws.size());
+    for (std::size_t d = 0; d < draws.size() && options.cones == nullptr; ++d) { // cones that are given need no mesh
         const Mesh& mesh = draws[d].mesh;
         const device_buffer<core::snapped_position> exact(from, mesh.num_vertices());
         const device_buffer<int32_position> near(from, mesh.num_vertices());
         vertex_shade(mesh, draws[d].vertex_shader, snap, static_cast<std::uint32_t>(d),
                      {const_cast<core::snapped_position*>(exact.data()), const_cast<int32_position*>(near.data())},
                      static_cast<no_varyings*>(nullptr), from.stream);
-        meshes.push_back({copy_to_host(exact.data(), exact.size(), from.stream),
-                          copy_to_host(mesh.triangles.data(), mesh.triangles.size(), from.stream)});
+        meshes[d] = {copy_to_host(exact.data(), exact.size(), from.stream),
+                     copy_to_host(mesh.triangles.data(), mesh.triangles.size(), from.stream)};
     }
     check(cudaStreamSynchronize(from.stream), stage::vertex_shade);
 
