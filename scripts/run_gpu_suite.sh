@@ -119,7 +119,8 @@ run_suite() {
     local part=$1 folder=$2 source program
     for source in tests/{stages,strategies,robustness}/*_test.cu api_test.cu; do
         case $source in # these are in a program that has another file's name
-        */solid_calls_test.cu | */programs_*_test.cu | */sparse_*_test.cu | */several_draws_test.cu | */workspace_test.cu) continue ;;
+        */solid_calls_test.cu | */device_repairs_test.cu | */programs_*_test.cu | */sparse_*_test.cu | */several_draws_test.cu | \
+            */workspace_test.cu) continue ;;
         esac
         program="build/$folder/tests/strategies/device_$(basename "$source" .cu)"
         [[ $part != default && $program == *scenes_test ]] && continue

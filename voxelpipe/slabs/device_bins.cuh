@@ -5,6 +5,7 @@
 // A mesh on one GPU, of whose triangles those stay that reach a slab.
 
 #include <voxelpipe/slabs/plan.hpp>
+#include <voxelpipe/slabs/records.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <array>
@@ -20,8 +21,7 @@ namespace voxelpipe::slabs::detail {
 struct bin_rule {
     core::snap_transform snap;
     glm::ivec3 extent;
-    coverage rule;
-    bool is_solid;
+    binning how;
 };
 
 // The triangles of a mesh as bin_rule sees them.
@@ -36,7 +36,8 @@ struct classifier {
         return core::vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result).position;
     }
     [[nodiscard]] __device__ classified operator()(const glm::uvec3& t) const {
-        return classify(by.snap, by.extent, by.rule, position(t.x), position(t.y), position(t.z), by.is_solid);
+        const glm::vec3 at[3] = {position(t.x), position(t.y), position(t.z)};
+        return by.how(by.snap, by.extent, at);
     }
 };
 
@@ -58,7 +59,7 @@ struct layer_counter {
         }
         const classified c = classes(t);
         atomicAdd(words + static_cast<int>(c.kind), 1ull);
-        if (c.kind != core::triangle_class::drawn) return;
+        if (c.kind != core::triangle_class::drawn || c.reach.empty()) return;
         unsigned long long* axis = words + count_words;
         for (int a = 0; a < 3; ++a) {
             const int layers = a == 0 ? classes.by.extent.x : a == 1 ? classes.by.extent.y : classes.by.extent.z;
@@ -75,13 +76,16 @@ struct slab_chooser {
     classifier<Mesh, VertexShader> classes;
     int axis, begin, end; // layers
     std::uint64_t count;
+    bool is_first_kept; // wherever it lies
     std::uint32_t* stays;
 
     __device__ void operator()(std::uint64_t i) const {
         bool reaches = false;
         if (i < count) {
             const classified c = classes(classes.mesh.triangles[i]);
-            reaches = c.kind == core::triangle_class::drawn && c.reach.lo[axis] < end && c.reach.hi[axis] >= begin;
+            reaches = c.kind == core::triangle_class::drawn && !c.reach.empty() && c.reach.lo[axis] < end &&
+                      c.reach.hi[axis] >= begin;
+            if (is_first_kept && i == 0) reaches = true;
         }
         stays[i] = reaches ? 1 : 0;
     }
@@ -128,20 +132,36 @@ public:
         return {};
     }
 
-    // Leaves the triangles that reach layers of an axis. All indices are good.
+    // Leaves the triangles that reach layers of an axis, and the first one where that is asked for. All indices are
+    // good.
     template <class VertexShader>
-    void keep(cuda_backend& gpu, const VertexShader& shader, const bin_rule& rule, int axis,
-              const layer_range& layers) {
+    void keep(cuda_backend& gpu, const VertexShader& shader, const bin_rule& rule, int axis, const layer_range& layers,
+              bool is_first_kept) {
         if (whole_ == 0) return;
         cuda_backend::buffer<std::uint32_t> stays(gpu, whole_ + 1);
         cuda_backend::buffer<std::uint64_t> places(gpu, whole_ + 1);
-        gpu.for_each(whole_ + 1, slab_chooser<view_type, VertexShader>{
-                                     {all(), shader, rule}, axis, layers.begin, layers.end, whole_, stays.data()});
+        gpu.for_each(whole_ + 1,
+                     slab_chooser<view_type, VertexShader>{
+                         {all(), shader, rule}, axis, layers.begin, layers.end, whole_, is_first_kept, stays.data()});
         const std::uint64_t kept = gpu.sum(stays, places);
         cuda_backend::buffer<glm::uvec3> triangles(gpu, kept);
         numbers_ = cuda_backend::buffer<std::uint32_t>(gpu, kept);
         gpu.for_each(whole_, slab_writer{triangles_.data(), places.data(), triangles.data(), numbers_.data()});
         triangles_ = std::move(triangles);
+    }
+
+    // All vertices of the mesh, shaded and snapped, in host memory. Waits.
+    template <class VertexShader>
+    [[nodiscard]] std::vector<core::snapped_position> snapped_vertices(cuda_backend& gpu, const VertexShader& shader,
+                                                                       const core::snap_transform& snap) const {
+        const view_type mesh = all();
+        cuda_backend::buffer<core::snapped_position> exact(gpu, mesh.num_vertices());
+        cuda_backend::buffer<device::int32_position> near(gpu, mesh.num_vertices());
+        device::with_runtime_errors([&] {
+            device::vertex_shade(mesh, shader, snap, 0, {exact.data(), near.data()}, static_cast<no_varyings*>(nullptr),
+                                 gpu.stream);
+        });
+        return exact.to_host(gpu);
     }
 
     // After keep().

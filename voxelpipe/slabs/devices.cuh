@@ -16,15 +16,18 @@
 #include <voxelpipe/slabs/device_bins.cuh>
 #include <voxelpipe/slabs/device_set.cuh>
 #include <voxelpipe/slabs/plan.hpp>
+#include <voxelpipe/slabs/resident_repairs.hpp>
 #include <voxelpipe/slabs/stream.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <new>
 #include <optional>
 #include <span>
 #include <stdexcept>
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -43,6 +46,12 @@ struct device_options {
     int align = 1;
     bool may_turn = true;  // false: slabs along z, which A-buffers and gather() need
     bool is_solid = false; // for draw_solid: triangles beside the grid along x count too, and slabs are along y or z
+    // For draw_solid with this repair, which decides what triangles a slab needs; is_solid then, and slabs of vote and
+    // exterior are along z.
+    voxelpipe::repair repair = voxelpipe::repair::none;
+    // Bytes of host memory for the search of a repair, about; beyond them it takes temporary files of this folder.
+    std::uint64_t memory = std::uint64_t{1} << 30;
+    std::string folder = "/tmp"; // of POSIX files
 };
 
 // One mesh in the slabs of several GPUs. Each GPU has all vertices, which its vertex shader sees as in one call, and
@@ -53,14 +62,17 @@ public:
     using mesh_type = mesh_view<Attributes...>; // in host memory
 
     // Copies the mesh; refers to the devices. Throws std::invalid_argument with the status's message if grid or mesh
-    // are not valid (no instances, no subset), and what the devices throw.
+    // are not valid (no instances, no subset), and what the devices throw. For close_holes and vote it also searches
+    // all triangles, once, see draw_solid: std::bad_alloc, and std::system_error of files.
     device_slabs(devices& gpus, const grid& g, const mesh_type& mesh, const VertexShader& shader,
                  const device_options& options = {})
         : gpus_(gpus), grid_(g), shader_(shader), options_(options), meshes_(gpus.size()) {
+        if (options_.repair != voxelpipe::repair::none) options_.is_solid = true;
         status s = validate(g);
         if (s.ok()) s = core::validate_draws(std::span(&as_const(draw_of(mesh, constant_output<bool>{})), 1));
         if (s.ok() && (mesh.copies.count != 1 || mesh.part.whole != 0)) s = core::failure(status_code::bad_subset);
         if (s.ok()) s = cut(mesh);
+        if (s.ok()) s = search(mesh);
         if (!s.ok()) throw std::invalid_argument("voxelpipe::slabs: " + s.message());
     }
 
@@ -93,18 +105,39 @@ public:
     template <class FragmentShader, class Output>
     [[nodiscard]] status draw(const FragmentShader& shader, std::vector<Output>& outputs) {
         if (detail::is_abuffer<Output> && plan_.axis != 2) return core::failure(status_code::bad_crop);
-        return draw_each(shader, outputs, [&](cuda_backend& gpu, auto draws, const grid& g, Output& out) {
+        return draw_each(shader, outputs, [&](cuda_backend& gpu, auto draws, const grid& g, Output& out, std::size_t) {
             return voxelize(gpu, draws, g, out, options_.voxelize);
         });
     }
-    // The same for solids, without repairs. Counts of rows are sums over the slabs.
+    // The same for solids: voxels, counts and counts of rows are those of one call. how.repair is that of
+    // device_options; how.cones and how.slab are found here, and not given. What a repair copies to host memory, and
+    // what it holds there as long as the object lives:
+    //   close_holes   copies all vertices, 24 bytes each, in the constructor, where one thread goes through all
+    //                 triangles; holds the boundaries of the holes and their cones, about 100 bytes a boundary edge
+    //   vote          copies the same; holds a layer of bits of the grid for each slab, and one more
+    //   exterior      copies the cover of each slab, which its GPU draws, 72 bytes a brick, where the host floods:
+    //                 the first call, and one with another `closing`; holds a bit a voxel of the whole grid. A
+    //                 crop is refused, as by one call (crop_without_whole)
+    // The search may take device_options::memory beside it, for exterior slab_exterior::least_bytes at least. Each call
+    // copies its slab's part of what is held to its GPU. Throws std::system_error of files.
     template <class SolidShader, class Output>
     [[nodiscard]] status draw_solid(const SolidShader& shader, std::vector<Output>& outputs,
                                     const solid_options& how = {}) {
-        if (how.repair != repair::none || !options_.is_solid) return core::failure(status_code::bad_solid_options);
-        return draw_each(shader, outputs, [&](cuda_backend& gpu, auto draws, const grid& g, Output& out) {
-            return voxelize_solid(gpu, draws, g, out, how);
-        });
+        if (!options_.is_solid || how.repair != options_.repair || how.slab != nullptr || how.cones != nullptr)
+            return core::failure(status_code::bad_solid_options);
+        if (const status s = core::validate(how, grid_); !s.ok()) return s;
+        try {
+            if (const status s = find_repair(how); !s.ok()) return s;
+        } catch (const std::bad_alloc&) {
+            return core::failure(status_code::out_of_memory, stage::coarse_raster);
+        }
+        status s =
+            draw_each(shader, outputs, [&](cuda_backend& gpu, auto draws, const grid& g, Output& out, std::size_t i) {
+                const solid_options of_slab = repairs_ ? repairs_->of(i, how) : how;
+                return voxelize_solid(gpu, draws, g, out, of_slab);
+            });
+        if (s.ok() && repairs_) repairs_->count(s.solid);
+        return s;
     }
 
     // ---- calls that never wait ----
@@ -218,7 +251,7 @@ private:
         }
         plan_options how;
         how.align = options_.align;
-        how.may_turn = options_.may_turn;
+        how.may_turn = options_.may_turn && !detail::resident_repairs::is_along_z(options_.repair);
         how.triangle_cost = static_cast<std::uint64_t>(8 * options_.triangle_bytes); // in bits
         how.voxel_cost = static_cast<std::uint64_t>(8 * options_.voxel_bytes);
         plan_ = split(layers[0], static_cast<int>(n), how);
@@ -236,12 +269,52 @@ private:
             if (i >= size())
                 meshes_[i].reset();
             else
-                meshes_[i]->keep(gpu, shader_, rule(), plan_.axis, plan_.slabs[i]);
+                meshes_[i]->keep(gpu, shader_, rule(), plan_.axis, plan_.slabs[i],
+                                 detail::resident_repairs::fills_without_triangles(options_.repair));
             return status{};
         });
     }
     [[nodiscard]] detail::bin_rule rule() const {
-        return {core::make_snap_transform(grid_), grid_.extent, options_.voxelize.rule, options_.is_solid};
+        const binning how{options_.voxelize.rule, options_.is_solid, options_.repair};
+        return {core::make_snap_transform(grid_), grid_.extent, how};
+    }
+
+    // Begins the repair: what follows from the triangles alone.
+    [[nodiscard]] status search(const mesh_type& mesh) {
+        if (options_.repair == voxelpipe::repair::none) return {};
+        std::vector<grid> where;
+        for (const slab& s : slabs_) where.push_back(s.where);
+        repairs_.emplace(grid_, std::move(where), options_.repair, options_.memory, options_.folder);
+        if (!detail::resident_repairs::needs_triangles(options_.repair)) return {};
+        std::vector<core::snapped_position> vertices;
+        const status s = on_each(1, [&](std::size_t i, cuda_backend& gpu) {
+            vertices = meshes_[i]->snapped_vertices(gpu, shader_, rule().snap);
+            return status{};
+        });
+        if (s.ok()) repairs_->add(vertices, mesh.triangles);
+        return s;
+    }
+    // What the repair of a call takes of all slabs.
+    [[nodiscard]] status find_repair(const solid_options& how) {
+        if (!repairs_) return {};
+        using cover = sparse_framebuffer<cuda_backend, target<bit, blend::bit_or>>;
+        std::vector<host_sparse<target<bit, blend::bit_or>>> covers(size());
+        if (repairs_->needs_walls(how)) {
+            voxelize_options conservative;
+            conservative.rule = coverage::conservative;
+            conservative.count_voxels = false;
+            const status s = on_each(size(), [&](std::size_t i, cuda_backend& gpu) {
+                const auto one = draw_of(meshes_[i]->view(), constant(true));
+                cover out(gpu, slabs_[i].where.extent);
+                status drawn = voxelize(gpu, std::span(&one, 1), slabs_[i].where, out, conservative);
+                if (drawn.ok()) covers[i] = out.to_host(gpu);
+                return drawn;
+            });
+            if (!s.ok()) return s;
+        }
+        std::vector<brick_table> walls;
+        for (const auto& c : covers) walls.push_back(c.table());
+        return repairs_->find(how, walls);
     }
 
     template <class Shader, class Output, class Call>
@@ -249,7 +322,7 @@ private:
         if (outputs.size() != size()) return core::failure(status_code::extent_mismatch);
         const status s = on_each(size(), [&](std::size_t i, cuda_backend& gpu) {
             const auto one = draw_of(meshes_[i]->view(), shader);
-            return slabs_[i].drawn = call(gpu, std::span(&one, 1), slabs_[i].where, outputs[i]);
+            return slabs_[i].drawn = call(gpu, std::span(&one, 1), slabs_[i].where, outputs[i], i);
         });
         return s.ok() ? count_whole() : s;
     }
@@ -288,6 +361,7 @@ private:
     counters counts_;
     std::vector<slab> slabs_;
     std::vector<std::unique_ptr<detail::binned_mesh<Attributes...>>> meshes_; // by GPU
+    std::optional<detail::resident_repairs> repairs_;                         // none without a repair
 };
 
 } // namespace voxelpipe::slabs

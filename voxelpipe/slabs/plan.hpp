@@ -262,8 +262,9 @@ struct classified {
 // The same for voxelize_solid with repair::vote, in slabs along z: rows along all axes count, so that a triangle beside
 // the grid does that meets two of its intervals. Where it misses that of z, it is drawn, and its reach is empty: no
 // slab needs it.
-[[nodiscard]] inline classified classify_for_vote(const core::snap_transform& snap, const glm::ivec3& extent,
-                                                  const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
+[[nodiscard]] VOXELPIPE_HD inline classified classify_for_vote(const core::snap_transform& snap,
+                                                               const glm::ivec3& extent, const glm::vec3& a,
+                                                               const glm::vec3& b, const glm::vec3& c) {
     const auto snapped = [&](const glm::vec3& p) { return core::snap(snap, p.x, p.y, p.z); };
     const core::snapped_position p = snapped(a), q = snapped(b), r = snapped(c);
     const core::voxel_box whole{{{0, 0, 0}}, {{extent.x - 1, extent.y - 1, extent.z - 1}}};
@@ -273,8 +274,9 @@ struct classified {
     if (t.kind != core::triangle_class::drawn) return t;
     t.reach = core::bounds(p, q, r, snap.fraction);
     for (int axis = 0; axis < 2; ++axis) {
-        t.reach.lo[axis] = std::clamp(t.reach.lo[axis], whole.lo[axis], whole.hi[axis]);
-        t.reach.hi[axis] = std::clamp(t.reach.hi[axis], whole.lo[axis], whole.hi[axis]);
+        const auto nearest = [&](std::int64_t i) { return i < 0 ? 0 : i > whole.hi[axis] ? whole.hi[axis] : i; };
+        t.reach.lo[axis] = nearest(t.reach.lo[axis]);
+        t.reach.hi[axis] = nearest(t.reach.hi[axis]);
     }
     t.reach = core::intersect(t.reach, whole);
     return t;

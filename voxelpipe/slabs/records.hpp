@@ -80,8 +80,8 @@ struct binning {
 
     // As classify(), for a triangle's three corners. `drawn` with an empty reach: counted as drawn, but no slab needs
     // it.
-    [[nodiscard]] classified operator()(const core::snap_transform& snap, const glm::ivec3& extent,
-                                        const glm::vec3 (&at)[3]) const {
+    [[nodiscard]] VOXELPIPE_HD classified operator()(const core::snap_transform& snap, const glm::ivec3& extent,
+                                                     const glm::vec3 (&at)[3]) const {
         if (is_solid && repair == repair::vote) return classify_for_vote(snap, extent, at[0], at[1], at[2]);
         if (is_solid && repair == repair::exterior) // a cover is all that counts
             return classify(snap, extent, coverage::conservative, at[0], at[1], at[2]);
