@@ -5,7 +5,7 @@
 // each (slabs/devices.cuh); in the same run, by the host's clock around calls that wait. Efficiency is the time of one
 // GPU over the number of GPUs times theirs. Before it is timed, a cell is gathered on the first GPU and compared there
 // with what that GPU drew alone, where both fit. One GPU works for two where there is no other. Prints a table of
-// medians; --out writes it as CSV too.
+// medians; --out writes it as CSV too. Cells of solids, with their repairs, are measured where they are asked for.
 
 #include "gpu_set.cuh"
 #include "output.hpp"
@@ -17,6 +17,8 @@
 
 #include <algorithm>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -30,6 +32,11 @@ struct options : gpu::run_options {
     double triangle_bytes = slabs::device_options{}.triangle_bytes;
 };
 
+constexpr std::pair<const char*, vp::repair> solids[] = {{"solid", vp::repair::none},
+                                                         {"close_holes", vp::repair::close_holes},
+                                                         {"vote", vp::repair::vote},
+                                                         {"exterior", vp::repair::exterior}};
+
 struct words_differ {
     const std::uint32_t *a, *b;
     unsigned long long* count;
@@ -39,24 +46,30 @@ struct words_differ {
 };
 
 struct measured {
-    double ms = 0, binning_ms = 0, gather_ms = 0;
+    double ms = 0, binning_ms = 0, first_ms = 0, gather_ms = 0;
     std::string compared; // with the result of one GPU
     std::string slabs_ms; // each GPU's own call, on its own
 };
 
-// One kind of call of one scene in one grid.
-template <class Output, class Shader>
+struct surfaces {};
+
+// One kind of call of one scene in one grid. Kind: surfaces, or the vp::solid_options of solids.
+template <class Output, class Shader, class Kind>
 class cell {
-    static constexpr bool is_list = slabs::detail::is_abuffer<Output>;
+    static constexpr bool is_list = slabs::detail::is_abuffer<Output>, is_solid = !std::is_same_v<Kind, surfaces>;
 
 public:
-    cell(const options& how, const slabs::devices& one, const mesh_data& data, int n, const Shader& shader)
-        : how_(how), data_(data), grid_(vp::fit(data.positions, glm::ivec3(n))), shader_(shader),
+    cell(const options& how, const slabs::devices& one, const mesh_data& data, int n, const Shader& shader,
+         const Kind& kind)
+        : how_(how), data_(data), grid_(vp::fit(data.positions, glm::ivec3(n))), shader_(shader), kind_(kind),
           backend_(one.backend(0)), mesh_(backend_, data.positions, data.triangles),
           whole_(make(backend_, grid_.extent)) {
         options_.count_voxels = is_list;
         one_ms_ = gpu::median_ms(how_.repeat, [&] {
-            last_ = vp::voxelize(backend_, mesh_, grid_, vp::passthrough{}, shader_, whole_, options_);
+            if constexpr (is_solid)
+                last_ = vp::voxelize_solid(backend_, mesh_, grid_, vp::passthrough{}, shader_, whole_, kind_);
+            else
+                last_ = vp::voxelize(backend_, mesh_, grid_, vp::passthrough{}, shader_, whole_, options_);
             if (last_.code == vp::status_code::out_of_memory) throw gpu::out_of_device_memory(last_.message());
             last_.or_throw();
         });
@@ -71,20 +84,38 @@ public:
         cut.may_turn = false;
         cut.voxel_bytes = slabs::detail::bytes_per_voxel<Output>;
         cut.triangle_bytes = how_.triangle_bytes;
+        if constexpr (is_solid) {
+            cut.is_solid = true;
+            cut.repair = kind_.repair;
+        }
         const vp::mesh_view<> view{data_.positions, data_.triangles};
-        (void)slabs::device_slabs(gpus, grid_, view, vp::passthrough{}, cut); // loads the kernels
-        const double begin = gpu::now_ms();
-        slabs::device_slabs drawn(gpus, grid_, view, vp::passthrough{}, cut);
-        m.binning_ms = gpu::now_ms() - begin;
-        auto parts = drawn.make([](vp::cuda_backend& backend, glm::ivec3 extent) { return make(backend, extent); });
+        using slabs_type = slabs::device_slabs<vp::passthrough>;
+        const auto make_parts = [](slabs_type& drawn) {
+            return drawn.make([](vp::cuda_backend& backend, glm::ivec3 extent) { return make(backend, extent); });
+        };
         vp::status s;
-        const auto call = [&] {
-            s = drawn.draw(shader_, parts);
+        const auto call = [&](slabs_type& drawn, std::vector<Output>& parts) {
+            if constexpr (is_solid)
+                s = drawn.draw_solid(shader_, parts, kind_);
+            else
+                s = drawn.draw(shader_, parts);
             s.or_throw();
         };
-        call();
+        { // loads the kernels on all GPUs
+            slabs_type drawn(gpus, grid_, view, vp::passthrough{}, cut);
+            auto parts = make_parts(drawn);
+            call(drawn, parts);
+        }
+        double begin = gpu::now_ms();
+        slabs_type drawn(gpus, grid_, view, vp::passthrough{}, cut);
+        m.binning_ms = gpu::now_ms() - begin;
+        auto parts = make_parts(drawn);
+        begin = gpu::now_ms();
+        call(drawn, parts);
+        m.first_ms = gpu::now_ms() - begin;
         compare(drawn, gpus, parts, s, m);
-        m.ms = gpu::median_ms(how_.repeat, call);
+        m.ms = gpu::median_ms(how_.repeat, [&] { call(drawn, parts); });
+        if constexpr (is_solid) return m;                // a slab's call needs what the others found
         for (std::size_t i = 0; i < drawn.size(); ++i) { // alone, so that no GPU waits for another
             double ms = 0;
             gpus.for_each(i + 1, [&](std::size_t k, vp::cuda_backend& backend) {
@@ -109,7 +140,8 @@ private:
     }
     template <class Slabs>
     void compare(Slabs& drawn, slabs::devices& gpus, std::vector<Output>& parts, const vp::status& s, measured& m) {
-        if (!(s.counts == last_.counts)) throw std::runtime_error("other counts than one GPU's");
+        if (!(s.counts == last_.counts) || !(s.solid == last_.solid))
+            throw std::runtime_error("other counts than one GPU's");
         m.compared = "counts";
         if constexpr (is_list) {
             vp::host_abuffer<void> joined;
@@ -144,6 +176,7 @@ private:
     const mesh_data& data_;
     vp::grid grid_;
     Shader shader_;
+    Kind kind_;
     vp::voxelize_options options_;
     vp::cuda_backend& backend_;
     vp::mesh<vp::cuda_backend> mesh_;
@@ -163,16 +196,17 @@ int run(const options& how, const std::string& command) {
     slabs::devices one({ordinals[0]});
     gpu::clock_watch watch;
     table rows({"scene", "resolution", "cell", "triangles", "fragments", "gpus", "one_ms", "ms", "efficiency",
-                "slabs_ms", "binning_ms", "gather_ms", "compared"});
+                "slabs_ms", "binning_ms", "first_ms", "gather_ms", "compared"});
     std::vector<std::string> notes;
     bool failed = false;
     for (const std::string& name : how.names.empty() ? available_scenes(how.scenes, notes) : how.names) {
         const mesh_data data = find_mesh(how.scenes, name);
-        const auto measure = [&]<class Output>(std::type_identity<Output>, const char* kind, int n, auto shader) {
+        const auto measure = [&]<class Output>(std::type_identity<Output>, const char* kind, int n, auto shader,
+                                               auto how_drawn) {
             if (std::find(how.cells.begin(), how.cells.end(), kind) == how.cells.end()) return;
             try {
                 gpu::trim_pools(one);
-                cell<Output, decltype(shader)> c(how, one, data, n, shader);
+                cell<Output, decltype(shader), decltype(how_drawn)> c(how, one, data, n, shader, how_drawn);
                 for (std::size_t k = 2; k <= ordinals.size(); ++k) {
                     slabs::devices gpus({ordinals.begin(), ordinals.begin() + static_cast<std::ptrdiff_t>(k)});
                     const measured m = c.draw_with(gpus);
@@ -182,7 +216,8 @@ int run(const options& how, const std::string& command) {
                     rows.add_row({data.name, std::to_string(n), kind, std::to_string(c.counts().triangles_in),
                                   std::to_string(c.counts().fragments), std::to_string(k), significant(c.one_ms(), 4),
                                   significant(m.ms, 4), significant(efficiency), m.slabs_ms, significant(m.binning_ms),
-                                  m.gather_ms > 0 ? significant(m.gather_ms) : "", m.compared});
+                                  significant(m.first_ms), m.gather_ms > 0 ? significant(m.gather_ms) : "",
+                                  m.compared});
                     say(data.name + " " + std::to_string(n) + " " + kind + ", " + std::to_string(k) +
                         " GPUs: " + significant(c.one_ms(), 4) + " -> " + significant(m.ms, 4) + " ms, slabs " +
                         m.slabs_ms + ", same " + m.compared);
@@ -195,9 +230,11 @@ int run(const options& how, const std::string& command) {
             }
         };
         for (const int n : how.resolutions) {
-            measure(std::type_identity<bits>{}, "bit", n, vp::constant(true));
-            measure(std::type_identity<sums>{}, "float_add", n, vp::constant(0.7f));
-            measure(std::type_identity<lists>{}, "abuffer", n, vp::constant(true));
+            measure(std::type_identity<bits>{}, "bit", n, vp::constant(true), surfaces{});
+            measure(std::type_identity<sums>{}, "float_add", n, vp::constant(0.7f), surfaces{});
+            measure(std::type_identity<lists>{}, "abuffer", n, vp::constant(true), surfaces{});
+            for (const auto& [kind, repair] : solids)
+                measure(std::type_identity<bits>{}, kind, n, vp::constant(true), vp::solid_options{.repair = repair});
         }
     }
     std::string used = "GPUs:";
@@ -207,8 +244,10 @@ int run(const options& how, const std::string& command) {
         {"Several GPUs of one host",
          "gpu_scale",
          "by the host's clock, allocations and waits included, mesh on the devices",
-         {used, "slabs_ms: the slab of each GPU while the others rest; binning_ms: copying the mesh to all "
-                "GPUs, cutting and binning, once a mesh; gather_ms: all slabs to the first GPU"},
+         {used,
+          "slabs_ms: the slab of each GPU while the others rest; binning_ms: copying the mesh to all "
+          "GPUs, cutting and binning, once a mesh, with the search of close_holes and vote; first_ms: the first call "
+          "behind it, which floods for exterior; gather_ms: all slabs to the first GPU"},
          notes,
          {}},
         watch, command, rows);
@@ -223,7 +262,10 @@ int main(int argc, char** argv) {
     gpu::command line("bench_gpu_gpus", "One GPU against several of the same host, a slab each", how,
                       "gpu_scale.md and gpu_scale.csv");
     line.add_meshes();
-    line.add("--cell", how.cells, "What is drawn: bit, float_add or abuffer; may be repeated", how.cells);
+    line.add("--cell", how.cells,
+             "What is drawn: bit, float_add, abuffer, and bits of solids: solid, close_holes, vote, exterior; may be "
+             "repeated",
+             how.cells);
     line.add("--triangle-bytes", how.triangle_bytes, "What a triangle costs when the grid is cut");
     return line.run(argc, argv, [&](const std::string& command) { return run(how, command); });
 }

@@ -55,6 +55,7 @@ struct case_of_slabs {
 
     void expect_same() {
         vp::cpu_backend cpu;
+        options.is_solid = true;
         options.repair = how.repair;
         slabs::devices gpus(gpus_for(num_slabs), is_parallel);
         const vp::mesh_view<> view{m.positions, m.triangles};
@@ -134,6 +135,29 @@ TEST(DeviceRepairs, OnlyHolesMayTurn) {
     }
     const vp::solid_options holes{.extent = vp::solid_extent::outer, .repair = vp::repair::close_holes};
     case_of_slabs{thin, g, holes, 2, {}}.expect_same();
+}
+
+// Along y where x would be best: rows along x need the triangles beside a slab.
+TEST(DeviceRepairs, SolidsAreNotCutAlongX) {
+    mesh_data thin = broken_meshes()[0]; // one layer along z, few along y
+    for (glm::vec3& p : thin.positions) p = {p.x, 11.0f + 0.2f * p.y, 12.0f + 0.01f * p.z};
+    const vp::grid g = box_grid({37, 26, 25});
+    const vp::mesh_view<> view{thin.positions, thin.triangles};
+    for (const bool is_solid : {false, true}) {
+        slabs::devices gpus(gpus_for(2), is_parallel);
+        slabs::device_options options;
+        options.is_solid = is_solid;
+        slabs::device_slabs drawn(gpus, g, view, vp::passthrough{}, options);
+        EXPECT_EQ(drawn.cuts().axis, is_solid ? 1 : 0);
+        // Lists need slabs along z, and each kind of call its own slabs.
+        auto lists = drawn.make(
+            [](vp::cuda_backend& gpu, glm::ivec3) { return vp::abuffer<vp::cuda_backend, std::uint32_t>{gpu}; });
+        const vp::status_code solid = drawn.draw_solid(numbered, lists).code,
+                              surface = drawn.draw(numbered, lists).code;
+        EXPECT_EQ(solid, is_solid ? vp::status_code::bad_crop : vp::status_code::bad_solid_options);
+        EXPECT_EQ(surface, is_solid ? vp::status_code::bad_solid_options : vp::status_code::bad_crop);
+    }
+    case_of_slabs{thin, g, {.extent = vp::solid_extent::outer}, 2, {}}.expect_same();
 }
 
 // Two plates that a long cone, or `closing`, joins: slabs between them have voxels, and no triangle.

@@ -101,17 +101,18 @@ public:
     }
 
     // Draws every slab into its output, at once, and waits. Returns the counts of the whole, or the first failure;
-    // other slabs may have been drawn then. A-buffers need slabs along z (bad_crop otherwise).
+    // other slabs may have been drawn then. A-buffers need slabs along z (bad_crop otherwise). bad_solid_options: the
+    // grid was cut for solids, which count other triangles as drawn.
     template <class FragmentShader, class Output>
     [[nodiscard]] status draw(const FragmentShader& shader, std::vector<Output>& outputs) {
-        if (detail::is_abuffer<Output> && plan_.axis != 2) return core::failure(status_code::bad_crop);
+        if (const status s = accepts<Output>(false); !s.ok()) return s;
         return draw_each(shader, outputs, [&](cuda_backend& gpu, auto draws, const grid& g, Output& out, std::size_t) {
             return voxelize(gpu, draws, g, out, options_.voxelize);
         });
     }
-    // The same for solids: voxels, counts and counts of rows are those of one call. how.repair is that of
-    // device_options; how.cones and how.slab are found here, and not given. What a repair copies to host memory, and
-    // what it holds there as long as the object lives:
+    // The same for solids, if device_options::is_solid: voxels, counts and counts of rows are those of one call.
+    // how.repair is that of device_options; how.cones and how.slab are found here, and not given. What a repair copies
+    // to host memory, and what it holds there as long as the object lives:
     //   close_holes   copies all vertices, 24 bytes each, in the constructor, where one thread goes through all
     //                 triangles; holds the boundaries of the holes and their cones, about 100 bytes a boundary edge
     //   vote          copies the same; holds a layer of bits of the grid for each slab, and one more
@@ -123,7 +124,8 @@ public:
     template <class SolidShader, class Output>
     [[nodiscard]] status draw_solid(const SolidShader& shader, std::vector<Output>& outputs,
                                     const solid_options& how = {}) {
-        if (!options_.is_solid || how.repair != options_.repair || how.slab != nullptr || how.cones != nullptr)
+        if (const status s = accepts<Output>(true); !s.ok()) return s;
+        if (how.repair != options_.repair || how.slab != nullptr || how.cones != nullptr)
             return core::failure(status_code::bad_solid_options);
         if (const status s = core::validate(how, grid_); !s.ok()) return s;
         try {
@@ -157,7 +159,7 @@ public:
     template <class FragmentShader, class Output>
     [[nodiscard]] status draw_async(const FragmentShader& shader, std::vector<Output>& outputs,
                                     std::span<const workspace_view> workspaces) {
-        if (device::is_lists<Output> && plan_.axis != 2) return core::failure(status_code::bad_crop);
+        if (const status s = accepts<Output>(false); !s.ok()) return s;
         if (outputs.size() != size() || workspaces.size() != size()) return core::failure(status_code::extent_mismatch);
         return on_each(size(), [&](std::size_t i, cuda_backend& gpu) {
             const auto one = draw_of(meshes_[i]->view(), shader);
@@ -233,6 +235,15 @@ private:
         return value;
     }
 
+    // Ok if the grid was cut for calls of this kind.
+    template <class Output>
+    [[nodiscard]] status accepts(bool solid) const {
+        if (solid != options_.is_solid) return core::failure(status_code::bad_solid_options);
+        if ((detail::is_abuffer<Output> || device::is_lists<Output>)&&plan_.axis != 2)
+            return core::failure(status_code::bad_crop);
+        return {};
+    }
+
     // Uploads the mesh, counts its triangles by layers, each GPU a share, cuts, and bins.
     [[nodiscard]] status cut(const mesh_type& mesh) {
         const std::size_t n = gpus_.size();
@@ -252,13 +263,10 @@ private:
         plan_options how;
         how.align = options_.align;
         how.may_turn = options_.may_turn && !detail::resident_repairs::is_along_z(options_.repair);
+        how.may_be_along_x = !options_.is_solid;
         how.triangle_cost = static_cast<std::uint64_t>(8 * options_.triangle_bytes); // in bits
         how.voxel_cost = static_cast<std::uint64_t>(8 * options_.voxel_bytes);
         plan_ = split(layers[0], static_cast<int>(n), how);
-        if (options_.is_solid && plan_.axis == 0) {
-            how.may_turn = false;
-            plan_ = split(layers[0], static_cast<int>(n), how);
-        }
         for (std::size_t i = 0; i < n; ++i) {
             if (plan_.slabs[i].size() == 0) continue;
             slab one;

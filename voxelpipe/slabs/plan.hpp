@@ -93,6 +93,7 @@ struct plan_options {
     std::uint64_t voxel_cost = 0;    // of each of its voxels, whose number in a layer depends on the axis
     int align = 1;                   // slabs begin at multiples of this, from the computed part's first layer
     bool may_turn = true;            // x or y may be chosen; A-buffers and files that are written in order need z
+    bool may_be_along_x = true;      // not for solids: a row along x crosses slabs beside the triangles that it needs
     double turn_gain = 1.05;         // another axis than z must be better by more than this factor
 };
 
@@ -200,6 +201,7 @@ private:
     if (!options.may_turn) return best;
     auto to_beat = static_cast<double>(best.bottleneck) / options.turn_gain;
     for (const int axis : {1, 0}) {
+        if (axis == 0 && !options.may_be_along_x) continue;
         plan other = detail::split_along(counts, axis, std::max(1, num_slabs), options);
         if (static_cast<double>(other.bottleneck) >= to_beat) continue;
         to_beat = static_cast<double>(other.bottleneck);
