@@ -115,8 +115,22 @@ public:
         m.first_ms = gpu::now_ms() - begin;
         compare(drawn, gpus, parts, s, m);
         m.ms = gpu::median_ms(how_.repeat, [&] { call(drawn, parts); });
-        if constexpr (is_solid) return m;                // a slab's call needs what the others found
-        for (std::size_t i = 0; i < drawn.size(); ++i) { // alone, so that no GPU waits for another
+        if constexpr (!is_solid) // the call of a solid's slab needs what the others found
+            time_alone(drawn, gpus, parts, m);
+        return m;
+    }
+
+private:
+    [[nodiscard]] static Output make(vp::cuda_backend& backend, glm::ivec3 extent) {
+        if constexpr (is_list)
+            return Output{backend};
+        else
+            return Output{backend, extent};
+    }
+    // Each slab's call while the other GPUs rest.
+    void time_alone(slabs::device_slabs<vp::passthrough>& drawn, slabs::devices& gpus, std::vector<Output>& parts,
+                    measured& m) {
+        for (std::size_t i = 0; i < drawn.size(); ++i) {
             double ms = 0;
             gpus.for_each(i + 1, [&](std::size_t k, vp::cuda_backend& backend) {
                 if (k != i) return;
@@ -128,15 +142,6 @@ public:
             });
             m.slabs_ms += (i == 0 ? "" : " ") + significant(ms);
         }
-        return m;
-    }
-
-private:
-    [[nodiscard]] static Output make(vp::cuda_backend& backend, glm::ivec3 extent) {
-        if constexpr (is_list)
-            return Output{backend};
-        else
-            return Output{backend, extent};
     }
     template <class Slabs>
     void compare(Slabs& drawn, slabs::devices& gpus, std::vector<Output>& parts, const vp::status& s, measured& m) {
