@@ -220,4 +220,8 @@ TEST(DeviceSparse, SlabsOfSeveralGpusAreTheCpus) {
     vp::slabs::device_slabs surfaces(gpus, grid, mesh.view(), vp::passthrough{});
     std::vector<framebuffer<vp::cuda_backend>> none;
     EXPECT_EQ(surfaces.draw_solid(solid_shader{}, none).code, vp::status_code::bad_solid_options);
+    vp::slabs::device_options for_solids;
+    for_solids.is_solid = true;
+    vp::slabs::device_slabs solids(gpus, grid, mesh.view(), vp::passthrough{}, for_solids);
+    EXPECT_EQ(solids.draw(shader{}, none).code, vp::status_code::bad_solid_options);
 }
