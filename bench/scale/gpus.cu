@@ -267,10 +267,9 @@ int main(int argc, char** argv) {
     gpu::command line("bench_gpu_gpus", "One GPU against several of the same host, a slab each", how,
                       "gpu_scale.md and gpu_scale.csv");
     line.add_meshes();
-    line.add("--cell", how.cells,
-             "What is drawn: bit, float_add, abuffer, and bits of solids: solid, close_holes, vote, exterior; may be "
-             "repeated",
-             how.cells);
+    std::vector<std::string> cells = how.cells;
+    for (const auto& [kind, repair] : solids) cells.emplace_back(kind);
+    line.add("--cell", how.cells, "What is drawn, bit, float_add and abuffer by default; may be repeated", cells);
     line.add("--triangle-bytes", how.triangle_bytes, "What a triangle costs when the grid is cut");
     return line.run(argc, argv, [&](const std::string& command) { return run(how, command); });
 }
