@@ -265,6 +265,31 @@ TEST(Stream, ASlabThatRunsOutOfMemoryIsCutAgain) {
     EXPECT_EQ(failed.code, vp::status_code::out_of_memory);
 }
 
+// A sink that runs out of memory has had the slab: it is not drawn again in parts.
+TEST(Stream, AShortageOfTheSinkIsThrown) {
+    whole_call whole(vp::coverage::conservative);
+    using bits = vp::framebuffer<backend_type, vp::target<vp::bit, vp::blend::bit_or>>;
+    const auto make = [&](glm::ivec3 size) { return bits{whole.backend, size}; };
+    int slabs = 0;
+    const auto sink = [&](const slabs::slab&, const bits&) {
+        if (++slabs == 2) throw std::bad_alloc();
+    };
+    stream_type surface(whole.backend, whole.grid, moved{}, whole.options(3));
+    whole.feed(surface);
+    EXPECT_THROW((void)surface.draw(vp::constant(true), make, sink), std::bad_alloc);
+    EXPECT_EQ(slabs, 2);
+    for (const auto repair : {vp::repair::none, vp::repair::exterior}) {
+        slabs::stream_options how = whole.options(3);
+        how.is_solid = true;
+        how.repair = repair;
+        stream_type solid(whole.backend, whole.grid, moved{}, how);
+        whole.feed(solid);
+        slabs = 0;
+        EXPECT_THROW((void)solid.draw_solid(vp::constant(true), make, sink, {.repair = repair}), std::bad_alloc);
+        EXPECT_EQ(slabs, 2);
+    }
+}
+
 TEST(Stream, OfACropIsTheCrop) {
     whole_call whole(vp::coverage::thin);
     whole.grid = whole.grid.crop({3, 5, 9}, {30, 21, 22});

@@ -28,6 +28,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <exception>
 #include <memory>
 #include <new>
 #include <stdexcept>
@@ -137,10 +138,12 @@ public:
     // framebuffer; sink(const slab&, that) gets it afterwards, by ascending voxels along the axis of the slabs. A slab
     // whose triangles and targets exceed the budget, or whose call runs out of memory, is cut again: along z, then y,
     // then x; A-buffers along z alone. Returns the counts of the whole, or the failure of a call; what earlier slabs
-    // gave has reached the sink by then. Throws what make and sink throw, and std::system_error of files.
+    // gave has reached the sink by then. Throws what sink throws, what make throws other than std::bad_alloc, which
+    // cuts the slab, and std::system_error of files.
     template <class FragmentShader, class Make, class Sink>
     [[nodiscard]] status draw(const FragmentShader& shader, const Make& make, const Sink& sink) {
-        return draw_slabs<false>(shader, make, sink, solid_options{}, 0.75);
+        return with_sink(sink,
+                         [&](const auto& to) { return draw_slabs<false>(shader, make, to, solid_options{}, 0.75); });
     }
     // The same for solids: the voxels, the counts and the counts of rows of one call with the whole mesh, which is one
     // draw. Slabs are along y or z, with vote and exterior along z. how.repair is that of stream_options; how.cones and
@@ -161,13 +164,11 @@ public:
             if (const status s = core::validate(how, grid_); !s.ok()) return s;
         if (repairs_.is_along_z() && !core::takes_solid_slabs<Backend>)
             return core::failure(status_code::strategy_unavailable);
-        try {
+        return with_sink(sink, [&](const auto& to) {
             if (!has_walls_)
                 if (const status s = repairs_.begin(how); !s.ok()) return s;
-            return draw_slabs<true>(shader, make, sink, how, repairs_.needs_walls() ? share_beside_flood : 0.75);
-        } catch (const std::bad_alloc&) {
-            return core::failure(status_code::out_of_memory, stage::coarse_raster);
-        }
+            return draw_slabs<true>(shader, make, to, how, repairs_.needs_walls() ? share_beside_flood : 0.75);
+        });
     }
 
 private:
@@ -179,6 +180,28 @@ private:
     [[nodiscard]] static const grid& checked(const grid& g) {
         if (const status s = validate(g); !s.ok()) throw std::invalid_argument("voxelpipe::slabs: " + s.message());
         return g;
+    }
+
+    // Calls work(the sink, as one that returns true if it has thrown nothing). A shortage of memory is a status, but
+    // one of the sink is thrown: a slab that was cut for it would reach the sink twice.
+    template <class Sink, class Work>
+    [[nodiscard]] static status with_sink(const Sink& sink, const Work& work) {
+        std::exception_ptr thrown;
+        status result;
+        try {
+            result = work([&](const slab& part, auto& out) {
+                try {
+                    sink(part, out);
+                } catch (...) {
+                    thrown = std::current_exception();
+                }
+                return !thrown;
+            });
+        } catch (const std::bad_alloc&) {
+            result = core::failure(status_code::out_of_memory, stage::coarse_raster);
+        }
+        if (thrown) std::rethrow_exception(thrown);
+        return result;
     }
 
     // share: of the memory, that a slab may take.
@@ -221,7 +244,7 @@ private:
                 }
                 if (part.drawn.ok()) {
                     add_drawn(all, part.drawn);
-                    sink(std::as_const(part), out);
+                    if (!sink(std::as_const(part), out)) return core::failure(status_code::other_rank_failed);
                     if constexpr (IsSolid) repairs_.leave();
                 }
                 return part.drawn;
