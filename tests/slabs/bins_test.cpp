@@ -145,6 +145,41 @@ TEST(Bins, AFullMediumIsReported) {
     EXPECT_NE(what.find("cannot write a temporary file"), std::string::npos) << what;
 }
 
+// More bins than files that a process may have open, in turns, so that each has pieces all over its file.
+TEST(Bins, ManyShareAFewFiles) {
+    rlimit before{};
+    ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
+    const rlimit little{120, before.rlim_max};
+    ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &little), 0);
+    constexpr std::size_t count = 500, each = 60;
+    std::vector<slabs::bin<std::uint64_t>> bins(count);
+    std::string what;
+    try {
+        slabs::bin_memory<std::uint64_t> memory(count * 200, count, ::testing::TempDir());
+        for (std::uint64_t n = 0; n < each; ++n)
+            for (std::size_t i = 0; i < count; ++i) memory.push(bins, (7 * i) % count, 1000 * n + (7 * i) % count);
+        for (std::size_t i = 0; i < count; ++i) {
+            ASSERT_EQ(bins[i].size(), each);
+            EXPECT_GT(bins[i].in_file(), 0u);
+            std::uint64_t next = 0, wrong = 0;
+            bins[i].for_each_block([&](std::span<const std::uint64_t> block) {
+                for (const std::uint64_t r : block) wrong += r != 1000 * next++ + i ? 1 : 0;
+            });
+            for (std::size_t first = 0; first < each; first += 7) {
+                std::vector<std::uint64_t> part(std::min<std::size_t>(13, each - first));
+                bins[i].copy(first, part);
+                for (std::size_t k = 0; k < part.size(); ++k) wrong += part[k] != 1000 * (first + k) + i ? 1 : 0;
+            }
+            EXPECT_EQ(wrong, 0u) << "bin " << i;
+            EXPECT_EQ(next, each);
+        }
+    } catch (const std::system_error& e) {
+        what = e.what();
+    }
+    (void)setrlimit(RLIMIT_NOFILE, &before);
+    EXPECT_EQ(what, "");
+}
+
 // Slabs that are visited twice: parts of one that was cut do not stay in memory for the second time.
 TEST(SlabQueue, PartsThatAreKeptAreInFiles) {
     using plain_record = slabs::record<vp::no_varyings>;

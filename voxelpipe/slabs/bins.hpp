@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <deque>
+#include <iterator>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -44,7 +45,6 @@ public:
     scratch_file& operator=(const scratch_file&) = delete;
     ~scratch_file() { ::close(file_); }
 
-    [[nodiscard]] std::uint64_t size() const { return size_; } // bytes, those on their way too
     // Room for bytes at the end, for one write(); returns where. By one thread at a time.
     [[nodiscard]] std::uint64_t extend(std::uint64_t bytes) {
         coming_.fetch_add(1);
@@ -113,8 +113,8 @@ class bin {
 
 public:
     [[nodiscard]] std::uint64_t size() const { return in_file() + in_memory(); }
-    // Records in the file, and in memory.
-    [[nodiscard]] std::uint64_t in_file() const { return file_ == nullptr ? 0 : file_->size() / sizeof(Record); }
+    // Records in the file.
+    [[nodiscard]] std::uint64_t in_file() const { return pieces_.empty() ? 0 : pieces_.back().end; }
     // Records in memory.
     [[nodiscard]] std::uint64_t in_memory() const { return in_memory_; }
     // Bytes that records in memory take, with those that are reserved.
@@ -137,28 +137,34 @@ public:
         }
         return (blocks_.size() - before) * block_ * sizeof(Record);
     }
-    // Takes the records in memory out, for its file.
-    [[nodiscard]] spilled_records<Record> spill(const std::string& folder) {
-        if (file_ == nullptr) file_ = std::make_shared<scratch_file>(folder);
+    // Takes the records in memory out, for a file that other bins may have too. All of a bin's go to the first one.
+    [[nodiscard]] spilled_records<Record> spill(const std::shared_ptr<scratch_file>& file) {
+        if (file_ == nullptr) file_ = file;
         file_->check();
         const std::uint64_t bytes = memory_bytes();
-        spilled_records<Record> out{file_, file_->extend(in_memory_ * sizeof(Record)), bytes, std::move(blocks_)};
+        pieces_.push_back({in_file() + in_memory_, 0});
+        const std::uint64_t offset = pieces_.back().offset = file_->extend(in_memory_ * sizeof(Record));
+        spilled_records<Record> out{file_, offset, bytes, std::move(blocks_)};
         blocks_.clear();
         in_memory_ = 0;
+        join_last_pieces();
         return out;
     }
     // Copies the records from `first` on; there are so many.
     void copy(std::uint64_t first, std::span<Record> to) const {
-        if (const std::uint64_t filed = in_file(); first < filed) {
-            const auto n = static_cast<std::size_t>(std::min<std::uint64_t>(to.size(), filed - first));
-            file_->read(first * sizeof(Record), std::as_writable_bytes(to.first(n)));
+        auto from = std::upper_bound(pieces_.begin(), pieces_.end(), first,
+                                     [](std::uint64_t record, const piece& p) { return record < p.end; });
+        for (; from != pieces_.end() && !to.empty(); ++from) {
+            const std::uint64_t begin = from == pieces_.begin() ? 0 : std::prev(from)->end;
+            const auto n = static_cast<std::size_t>(std::min<std::uint64_t>(to.size(), from->end - first));
+            file_->read(from->offset + (first - begin) * sizeof(Record), std::as_writable_bytes(to.first(n)));
             first += n;
             to = to.subspan(n);
         }
         for (first -= in_file(); !to.empty();) {
-            const std::vector<Record>& from = blocks_[static_cast<std::size_t>(first / block_)];
-            const auto at = static_cast<std::size_t>(first % block_), n = std::min(to.size(), from.size() - at);
-            std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(at), n, to.begin());
+            const std::vector<Record>& block = blocks_[static_cast<std::size_t>(first / block_)];
+            const auto at = static_cast<std::size_t>(first % block_), n = std::min(to.size(), block.size() - at);
+            std::copy_n(block.begin() + static_cast<std::ptrdiff_t>(at), n, to.begin());
             first += n;
             to = to.subspan(n);
         }
@@ -171,27 +177,46 @@ public:
                             most = std::max<std::uint64_t>(1, (std::uint64_t{4} << 20) / sizeof(Record));
         for (std::uint64_t first = 0; first < total; first += most) {
             read.resize(static_cast<std::size_t>(std::min(most, total - first)));
-            file_->read(first * sizeof(Record), std::as_writable_bytes(std::span<Record>(read)));
+            copy(first, std::span<Record>(read));
             f(std::span<const Record>(read));
         }
         for (const auto& b : blocks_) f(std::span<const Record>(b));
     }
 
 private:
+    // The records of the file from the end of the piece before on.
+    struct piece {
+        std::uint64_t end, offset; // records; bytes in the file
+    };
+    // One of two that follow each other in the file, as they do where no other bin has it.
+    void join_last_pieces() {
+        const std::size_t n = pieces_.size();
+        if (n < 2) return;
+        piece& before = pieces_[n - 2];
+        const std::uint64_t begin = n < 3 ? 0 : pieces_[n - 3].end;
+        if (before.offset + (before.end - begin) * sizeof(Record) != pieces_[n - 1].offset) return;
+        before.end = pieces_[n - 1].end;
+        pieces_.pop_back();
+    }
+
     std::vector<std::vector<Record>> blocks_; // all full but the last
-    std::shared_ptr<scratch_file> file_;      // none, or what has left memory
+    std::shared_ptr<scratch_file> file_;      // none, or where records went that have left memory
+    std::vector<piece> pieces_;               // these, in order
     std::uint64_t in_memory_ = 0;
     std::size_t block_ = 1;
 };
 
-// Keeps the memory of several bins below a budget: beyond three quarters of it, the largest goes to its file. Threads
-// write while more records come; these wait once the budget is full of what is on its way.
+// Keeps the memory of several bins below a budget: beyond three quarters of it, the largest goes to a file. Threads
+// write while more records come; these wait once the budget is full of what is on its way. Bins that follow each other
+// share a file where there are many: a process may have some thousand open.
 template <class Record>
 class bin_memory {
 public:
-    // budget: bytes of all bins' memory. folder: for files.
+    static constexpr std::size_t most_files = 64; // open at a time
+
+    // budget: bytes of all bins' memory. folder: for files, each of which is there as long as a bin has records in it.
     bin_memory(std::uint64_t budget, std::size_t num_bins, std::string folder)
-        : budget_(budget), folder_(std::move(folder)),
+        : budget_(budget), folder_(std::move(folder)), files_(std::clamp<std::size_t>(num_bins, 1, most_files)),
           block_(static_cast<std::size_t>(std::clamp<std::uint64_t>(
               budget / sizeof(Record) / (4 * std::max<std::size_t>(1, num_bins)), 16, 65536))) {}
     bin_memory(const bin_memory&) = delete;
@@ -223,11 +248,18 @@ public:
             });
             if (largest.in_memory() == 0) return;
             held_ -= largest.memory_bytes();
-            send(largest.spill(folder_));
+            send(largest.spill(file_of(static_cast<std::size_t>(&largest - bins.data()), bins.size())));
         }
     }
 
 private:
+    // The file of bin i of `count`.
+    [[nodiscard]] std::shared_ptr<scratch_file> file_of(std::size_t i, std::size_t count) {
+        std::weak_ptr<scratch_file>& known = files_[i * files_.size() / count];
+        std::shared_ptr<scratch_file> file = known.lock();
+        if (file == nullptr) known = file = std::make_shared<scratch_file>(folder_);
+        return file;
+    }
     // To a thread that writes; waits for room.
     void send(spilled_records<Record> records) {
         constexpr std::size_t most_writers = 2;
@@ -263,6 +295,7 @@ private:
 
     std::uint64_t budget_, held_ = 0; // bytes; held by the bins
     std::string folder_;
+    std::vector<std::weak_ptr<scratch_file>> files_; // by ranges of bins
     std::size_t block_;
     std::mutex mutex_; // of what follows
     std::condition_variable comes_, goes_;

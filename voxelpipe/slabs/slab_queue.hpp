@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <deque>
 #include <future>
+#include <memory>
 #include <new>
 #include <type_traits>
 #include <utility>
@@ -86,7 +87,10 @@ public:
             if (result.code == status_code::out_of_memory && cut_front(cost, bytes / 2)) continue;
             if (!result.ok()) return result;
             if (keeps) {
-                if (next.is_cut && next.triangles.in_memory() != 0) next.triangles.spill(options_->folder).write();
+                if (next.is_cut && next.triangles.in_memory() != 0) {
+                    if (kept_ == nullptr) kept_ = std::make_shared<scratch_file>(options_->folder);
+                    next.triangles.spill(kept_).write();
+                }
                 done.push_back(std::move(next));
             }
             slabs_.pop_front();
@@ -163,6 +167,7 @@ private:
     unsigned threads_ = 1;
     int axis_ = 2, last_axis_ = 0;
     std::deque<entry> slabs_;
+    std::shared_ptr<scratch_file> kept_; // for parts of slabs that were cut and stay; none yet
 };
 
 } // namespace voxelpipe::slabs::detail
