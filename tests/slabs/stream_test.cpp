@@ -221,6 +221,8 @@ TEST(Stream, SolidsAreTheWhole) {
     const auto none = [](const slabs::slab&, const targets&) { FAIL(); };
     EXPECT_EQ(surfaces.draw_solid(winding{}, make, none).code, vp::status_code::bad_solid_options);
     how.is_solid = true;
+    stream_type solids(whole.backend, whole.grid, moved{}, how); // which count other triangles as drawn
+    EXPECT_EQ(solids.draw(vp::constant(1), make, none).code, vp::status_code::bad_solid_options);
     stream_type repaired(whole.backend, whole.grid, moved{}, how);
     vp::solid_options solid;
     solid.repair = vp::repair::close_holes;

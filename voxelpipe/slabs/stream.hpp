@@ -138,10 +138,12 @@ public:
     // framebuffer; sink(const slab&, that) gets it afterwards, by ascending voxels along the axis of the slabs. A slab
     // whose triangles and targets exceed the budget, or whose call runs out of memory, is cut again: along z, then y,
     // then x; A-buffers along z alone. Returns the counts of the whole, or the failure of a call; what earlier slabs
-    // gave has reached the sink by then. Throws what sink throws, what make throws other than std::bad_alloc, which
-    // cuts the slab, and std::system_error of files.
+    // gave has reached the sink by then. bad_solid_options: the triangles were binned for solids, which count others as
+    // drawn. Throws what sink throws, what make throws other than std::bad_alloc, which cuts the slab, and
+    // std::system_error of files.
     template <class FragmentShader, class Make, class Sink>
     [[nodiscard]] status draw(const FragmentShader& shader, const Make& make, const Sink& sink) {
+        if (options_.is_solid) return core::failure(status_code::bad_solid_options);
         return with_sink(sink,
                          [&](const auto& to) { return draw_slabs<false>(shader, make, to, solid_options{}, 0.75); });
     }
