@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Shared by the tests of solids in slabs: meshes with holes that leave the grid.
+// Shared by the tests of solids in slabs: meshes with holes that leave the grid, and the comparison with one call.
 
 #include "slab_scene.hpp"
 
@@ -77,6 +77,75 @@ inline unit::small_mesh plates(const glm::ivec3& size) {
     add_quad(m, {1, 0, 0}, {1, y, 0}, {1, y, z}, {1, 0, z});
     add_quad(m, {0, 1, 0}, {x, 1, 0}, {x, 1, z}, {0, 1, z});
     return m;
+}
+
+// Differs from voxel to voxel, so that a misplaced slab shows.
+struct winding {
+    auto operator()(const vp::solid_fragment& f) const {
+        return vp::outputs(static_cast<std::int32_t>(f.winding + std::int64_t{3} * f.voxel.z + 100));
+    }
+};
+using solid_target = vp::target<std::int32_t, vp::blend::add>;
+using solid_targets = vp::framebuffer<backend_type, solid_target>;
+
+// A solid in one call.
+struct whole_solid {
+    unit::small_mesh mesh;
+    vp::grid grid;
+    vp::solid_options how;
+    unsigned threads = 2;
+    backend_type backend = unit::make_backend(threads);
+    solid_targets whole{backend, grid.extent};
+    vp::status one = vp::voxelize_solid(backend, mesh.view(), grid, vp::passthrough{}, winding{}, whole, how);
+    vp::host_target<solid_target> expected = vp::get<0>(whole).to_host_target(backend);
+
+    [[nodiscard]] auto make() {
+        return [this](const glm::ivec3& size) { return solid_targets{backend, size}; };
+    }
+    // Draws a stream that has got all triangles into what `of_slab` makes, and expects voxels and counts of the call.
+    struct compared {
+        int slabs = 0;
+        std::uint64_t voxels = 0; // of these slabs
+    };
+    template <class Stream, class Make>
+    compared expect_slabs(Stream& stream, const Make& of_slab) {
+        EXPECT_TRUE(one.ok()) << one.message();
+        compared all;
+        std::uint64_t wrong = 0;
+        const vp::status s = stream.draw_solid(
+            winding{}, of_slab,
+            [&](const slabs::slab& slab, const solid_targets& fb) {
+                const auto part = vp::get<0>(fb).to_host_target(backend);
+                const glm::ivec3 o = slab.where.offset - grid.offset;
+                unit::for_each_voxel(slab.where.extent, [&](int x, int y, int z) {
+                    wrong += part(x, y, z) != expected(o.x + x, o.y + y, o.z + z) ? 1 : 0;
+                    ++all.voxels;
+                });
+                ++all.slabs;
+            },
+            how);
+        EXPECT_TRUE(s.ok()) << s.message();
+        EXPECT_EQ(s.counts, one.counts);
+        EXPECT_EQ(s.solid, one.solid);
+        EXPECT_EQ(wrong, 0u);
+        return all;
+    }
+    [[nodiscard]] std::uint64_t num_voxels() const {
+        return static_cast<std::uint64_t>(grid.extent.x) * static_cast<std::uint64_t>(grid.extent.y) *
+               static_cast<std::uint64_t>(grid.extent.z);
+    }
+};
+
+// Of a stream of solids.
+inline slabs::stream_options options_for(const vp::solid_options& solid, int num_slabs,
+                                         std::uint64_t memory = std::uint64_t{1} << 30) {
+    slabs::stream_options o;
+    o.num_slabs = num_slabs;
+    o.memory = memory;
+    o.folder = ::testing::TempDir();
+    o.is_solid = true;
+    o.repair = solid.repair;
+    return o;
 }
 
 } // namespace slab_scene

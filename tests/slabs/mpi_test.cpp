@@ -5,6 +5,7 @@
 // whole.
 
 #include "broken_scene.hpp"
+#include "rank_scene.hpp"
 
 #include <voxelpipe/slabs/mpi.hpp>
 
@@ -12,21 +13,7 @@ namespace {
 
 using namespace slab_scene;
 using stream_type = slabs::mpi_stream<backend_type, moved, vp::mesh_view<glm::vec3>>;
-
-int my_rank() {
-    int rank = 0;
-    MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-    return rank;
-}
-int num_ranks() {
-    int n = 1;
-    MPI_Comm_size(MPI_COMM_WORLD, &n);
-    return n;
-}
-std::uint64_t sum_of_ranks(std::uint64_t n) {
-    MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPI_UINT64_T, MPI_SUM, MPI_COMM_WORLD);
-    return n;
-}
+using solid_stream = slabs::mpi_stream<backend_type, vp::passthrough>;
 
 struct Ranks : ::testing::TestWithParam<vp::coverage> {
     colored_mesh mesh = make_scene();
@@ -134,67 +121,14 @@ TEST_P(Ranks, SparseSlabsAreCropsOfTheWhole) {
     EXPECT_EQ(sum_of_ranks(voxels), expected.num_voxels());
 }
 
-struct winding {
-    auto operator()(const vp::solid_fragment& f) const {
-        return vp::outputs(static_cast<std::int32_t>(f.winding + f.voxel.z + 100));
-    }
-};
-using solid_targets = vp::framebuffer<backend_type, vp::target<std::int32_t, vp::blend::add>>;
-using solid_stream = slabs::mpi_stream<backend_type, vp::passthrough>;
-
-// A solid in one call, and in slabs of ranks whose triangles they have read in shares.
-struct rank_solid {
-    unit::small_mesh mesh;
-    vp::grid grid;
-    vp::solid_options how;
-    backend_type backend = unit::make_backend(1);
-    solid_targets whole{backend, grid.extent};
-    vp::status one = vp::voxelize_solid(backend, mesh.view(), grid, vp::passthrough{}, winding{}, whole, how);
-    vp::host_target<vp::target<std::int32_t, vp::blend::add>> expected = vp::get<0>(whole).to_host_target(backend);
-
-    // Returns the slabs of the ranks.
-    slabs::plan expect_ranks(std::uint64_t memory) {
-        EXPECT_TRUE(one.ok()) << one.message();
-        solid_stream stream(MPI_COMM_WORLD, backend, grid, {}, options(memory));
-        const auto [first, last] = slabs::share_of(mesh.triangles.size(), my_rank(), num_ranks());
-        stream.add({mesh.positions, vp::array_view<const glm::uvec3>(mesh.triangles.data() + first, last - first)})
-            .or_throw();
-        std::uint64_t wrong = 0, voxels = 0;
-        const vp::status s = draw(stream, [&](const slabs::slab& slab, const solid_targets& fb) {
-            const auto part = vp::get<0>(fb).to_host_target(backend);
-            const glm::ivec3 o = slab.where.offset - grid.offset;
-            unit::for_each_voxel(slab.where.extent, [&](int x, int y, int z) {
-                wrong += part(x, y, z) != expected(o.x + x, o.y + y, o.z + z) ? 1 : 0;
-                ++voxels;
-            });
-        });
-        EXPECT_TRUE(s.ok()) << s.message();
-        EXPECT_EQ(s.counts, one.counts);
-        EXPECT_EQ(s.solid, one.solid);
-        EXPECT_EQ(wrong, 0u);
-        EXPECT_EQ(sum_of_ranks(voxels), static_cast<std::uint64_t>(grid.extent.x) *
-                                            static_cast<std::uint64_t>(grid.extent.y) *
-                                            static_cast<std::uint64_t>(grid.extent.z));
-        return stream.slabs();
-    }
-    template <class Sink>
-    vp::status draw(solid_stream& stream, const Sink& sink) {
-        return stream.draw_solid(
-            winding{},
-            [&](glm::ivec3 size) {
-                return solid_targets{backend, size};
-            },
-            sink, how);
-    }
-    [[nodiscard]] slabs::stream_options options(std::uint64_t memory) const {
-        slabs::stream_options o;
-        o.memory = memory;
-        o.folder = ::testing::TempDir();
-        o.is_solid = true;
-        o.repair = how.repair;
-        return o;
-    }
-};
+// Compares a solid in slabs of ranks, whose triangles they have read in shares, with one call. Returns the slabs.
+slabs::plan expect_ranks(whole_solid& whole, std::uint64_t memory) {
+    solid_stream stream(MPI_COMM_WORLD, whole.backend, whole.grid, {}, options_for(whole.how, 0, memory));
+    stream.add(share_of(whole.mesh)).or_throw();
+    EXPECT_EQ(sum_of_ranks(whole.expect_slabs(stream, whole.make()).voxels), whole.num_voxels());
+    return stream.slabs();
+}
+slabs::plan expect_ranks(whole_solid&& whole, std::uint64_t memory) { return expect_ranks(whole, memory); }
 constexpr std::uint64_t much = std::uint64_t{1} << 30, little = 120'000;
 
 // Meshes with holes; of a crop, too.
@@ -204,11 +138,11 @@ TEST(RankSolids, RepairedSlabsAreTheWhole) {
          {vp::solid_options{}, vp::solid_options{.repair = vp::repair::close_holes},
           vp::solid_options{.extent = vp::solid_extent::outer, .repair = vp::repair::close_holes, .max_hole_edges = 3},
           vp::solid_options{.repair = vp::repair::vote}}) {
-        rank_solid broken{broken_scene(extent), uncut, how};
-        (void)broken.expect_ranks(much);
-        (void)broken.expect_ranks(little);
-        (void)rank_solid{plates(extent), uncut, how}.expect_ranks(much);
-        (void)rank_solid{broken_scene(extent), crop, how}.expect_ranks(little);
+        whole_solid broken{broken_scene(extent), uncut, how, 1};
+        (void)expect_ranks(broken, much);
+        (void)expect_ranks(broken, little);
+        (void)expect_ranks(whole_solid{plates(extent), uncut, how, 1}, much);
+        (void)expect_ranks(whole_solid{broken_scene(extent), crop, how, 1}, little);
     }
 }
 
@@ -220,13 +154,13 @@ TEST(RankSolids, FloodedSlabsAreTheWhole) {
         for (const int closing : {0, 1, 3}) {
             SCOPED_TRACE(std::to_string(size.z) + " layers, closing " + std::to_string(closing));
             const vp::solid_options how{.repair = vp::repair::exterior, .closing = closing};
-            rank_solid broken{broken_scene(size), unit::unit_grid(size), how};
+            whole_solid broken{broken_scene(size), unit::unit_grid(size), how, 1};
             voxels += broken.one.counts.voxels;
-            for (const slabs::layer_range& r : broken.expect_ranks(little).slabs) any_without |= r.size() == 0;
+            for (const slabs::layer_range& r : expect_ranks(broken, little).slabs) any_without |= r.size() == 0;
             if (closing != 1) continue;
-            (void)broken.expect_ranks(much);
-            (void)rank_solid{plates(size), broken.grid, how}.expect_ranks(much);
-            (void)rank_solid{{}, broken.grid, how}.expect_ranks(much);
+            (void)expect_ranks(broken, much);
+            (void)expect_ranks(whole_solid{plates(size), broken.grid, how, 1}, much);
+            (void)expect_ranks(whole_solid{{}, broken.grid, how, 1}, much);
         }
     EXPECT_GT(voxels, 50'000u);
     EXPECT_TRUE(any_without || num_ranks() == 1);
@@ -254,21 +188,28 @@ TEST(RankSolids, FloodsWindThroughAllRanks) {
     add_quad(m, {47.5f, 2.5f, 2.5f}, {47.5f, 10.5f, 2.5f}, {47.5f, 10.5f, 39.5f}, {47.5f, 2.5f, 39.5f});
     for (const int closing : {0, 1, 3}) {
         SCOPED_TRACE(closing);
-        rank_solid box{m, unit::unit_grid(size), {.repair = vp::repair::exterior, .closing = closing}};
+        whole_solid box{m, unit::unit_grid(size), {.repair = vp::repair::exterior, .closing = closing}, 1};
         for (int k = 0; k < 6; ++k) EXPECT_EQ(box.expected(5 + 6 * k, 6, 20) != 0, closing == 3) << k;
         EXPECT_NE(box.expected(41, 6, 20), 0);
-        for (const slabs::layer_range& r : box.expect_ranks(little).slabs) EXPECT_GT(r.size(), 6);
+        for (const slabs::layer_range& r : expect_ranks(box, little).slabs) EXPECT_GT(r.size(), 6);
     }
 }
 
 TEST(RankSolids, SaysWhatIsWrong) {
     const vp::grid uncut = unit::unit_grid(extent);
     const auto code = [](const vp::grid& grid, vp::repair of_stream, const vp::solid_options& how) {
-        rank_solid solid{broken_scene(extent), grid, how};
-        slabs::stream_options options = solid.options(much);
+        backend_type backend = unit::make_backend(1);
+        slabs::stream_options options = options_for(how, 0);
         options.repair = of_stream;
-        solid_stream stream(MPI_COMM_WORLD, solid.backend, grid, {}, options);
-        return solid.draw(stream, [](const slabs::slab&, const solid_targets&) { FAIL(); }).code;
+        solid_stream stream(MPI_COMM_WORLD, backend, grid, {}, options);
+        return stream
+            .draw_solid(
+                winding{},
+                [&](glm::ivec3 size) {
+                    return solid_targets{backend, size};
+                },
+                [](const slabs::slab&, const solid_targets&) { FAIL(); }, how)
+            .code;
     };
     using vp::status_code;
     const vp::solid_options flood{.repair = vp::repair::exterior};
@@ -339,6 +280,10 @@ int main(int argc, char** argv) {
     }
     int failed = RUN_ALL_TESTS();
     MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
+    if (my_rank() == 0) {
+        std::puts(failed == 0 ? "all ranks passed" : "a rank failed");
+        std::fflush(stdout);
+    }
     MPI_Finalize();
     return failed;
 }
