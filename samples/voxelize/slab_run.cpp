@@ -12,9 +12,11 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <fstream>
 #include <memory>
 #include <new>
@@ -37,42 +39,67 @@ constexpr std::pair<const char*, std::uint64_t voxelize_stats::*> kept_counts[] 
     {"triangles_drawn", &voxelize_stats::triangles_drawn},
     {"normals_cancelled", &voxelize_stats::normals_cancelled}};
 
-// The lock of a folder, which the system takes back from a process that ends in whatever way.
+// The lock of a folder, which the system takes back from a process that ends in whatever way. On NFS it is the
+// server's, so it holds between hosts. Throws write_error where the file system has no locks.
 class folder_lock {
 public:
-    explicit folder_lock(const fs::path& folder)
-        : file_(::open((folder / "lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666)) {
-        if (file_ >= 0) (void)::flock(file_, LOCK_EX);
+    explicit folder_lock(const fs::path& folder) {
+        const fs::path path = folder / "lock";
+        file_ = ::open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
+        int error = file_ < 0 ? errno : 0;
+        while (error == 0 && ::flock(file_, LOCK_EX) != 0)
+            if (errno != EINTR) error = errno;
+        // Who had the lock before may have removed the folder.
+        struct stat mine {
+        }, there{};
+        has_ = error == 0 && ::fstat(file_, &mine) == 0 && ::stat(path.c_str(), &there) == 0 &&
+               mine.st_ino == there.st_ino && mine.st_dev == there.st_dev;
+        if (error == 0 || error == ENOENT || error == ESTALE) return;
+        if (file_ >= 0) ::close(file_);
+        throw write_error(path, "lock: " + std::generic_category().message(error));
     }
     folder_lock(const folder_lock&) = delete;
     folder_lock& operator=(const folder_lock&) = delete;
     ~folder_lock() {
         if (file_ >= 0) ::close(file_);
     }
+    // False if the folder is gone.
+    explicit operator bool() const { return has_; }
 
 private:
     int file_;
+    bool has_ = false;
 };
 
-// The folder of the slabs of one output.
+// The folder of the slabs of one output. All that several processes may do at once is done under its lock.
 class slab_folder {
 public:
     slab_folder(const slab_output& output, const std::string& work)
         : output_(output), path_(output.target().string() + "." + work + ".slabs") {
-        std::error_code error;
         output_.check_target();
-        if (fs::exists(path_, error)) {
-            const folder_lock lock(path_);
-            // Its slabs became the output, and the process ended before it could remove the rest.
-            if (!has_data() && has_marks()) fs::remove_all(path_, error);
-        }
-        fs::create_directories(path_ / "data", error);
-        if (error) throw write_error(path_, "make a folder: " + error.message());
     }
     [[nodiscard]] const fs::path& path() const { return path_; }
-    [[nodiscard]] bool has(std::int64_t slab) const {
+    // Of these slabs of this process, those that have to be drawn; the folder stays until they are. None if another
+    // process makes the output meanwhile.
+    [[nodiscard]] std::vector<std::int64_t> begin(const std::vector<std::int64_t>& share) const {
         std::error_code error;
-        return fs::exists(mark_of(slab), error);
+        if (share.empty() && !fs::exists(path_, error)) return {};
+        const auto make = [&](const fs::path& folder) {
+            fs::create_directories(folder, error);
+            if (error) throw write_error(path_, "make a folder: " + error.message());
+        };
+        make(path_);
+        const folder_lock lock(path_);
+        if (!lock) return {};
+        // Without data its slabs became the output, and the process ended before it could remove the rest.
+        if (!has_data())
+            for (const fs::directory_entry& entry : fs::directory_iterator(path_, error))
+                if (entry.path().filename() != "lock") fs::remove_all(entry.path(), error);
+        make(path_ / "data");
+        std::vector<std::int64_t> missing;
+        for (const std::int64_t slab : share)
+            if (!has(slab)) missing.push_back(slab);
+        return missing;
     }
     void mark(std::int64_t slab, const voxelize_stats& counts) const {
         json line;
@@ -81,35 +108,38 @@ public:
         file.write(line.dump() + "\n");
         file.commit();
     }
-    // If all of them are there: makes the output of them, returns their counts in `all`, and its files. None if another
-    // process does.
-    [[nodiscard]] std::vector<fs::path> finish(voxelize_stats& all) {
-        const folder_lock lock(path_);
+    // If all slabs are there: makes the output of them, adds their counts to `all`, and returns its files. None if some
+    // are `left`, or another process does.
+    [[nodiscard]] std::vector<fs::path> finish(voxelize_stats& all, std::int64_t& left) const {
+        std::vector<fs::path> files;
         std::error_code error;
-        if (!has_data()) return {};
-        for (std::int64_t s = 0; s < output_.num_slabs(); ++s) {
-            std::ifstream file(mark_of(s));
-            const json line = json::parse(file, nullptr, false);
-            if (!line.is_object()) throw write_error(mark_of(s), "it holds no counts; remove it");
-            for (const auto& [name, count] : kept_counts) all.*count += line.value(name, std::uint64_t{0});
+        {
+            const folder_lock lock(path_);
+            if (!lock || !has_data()) return {};
+            for (std::int64_t s = 0; s < output_.num_slabs(); ++s) left += has(s) ? 0 : 1;
+            if (left != 0) return {};
+            for (std::int64_t s = 0; s < output_.num_slabs(); ++s) {
+                std::ifstream file(mark_of(s));
+                const json line = json::parse(file, nullptr, false);
+                if (!line.is_object()) throw write_error(mark_of(s), "it holds no counts; remove it");
+                for (const auto& [name, count] : kept_counts) all.*count += line.value(name, std::uint64_t{0});
+            }
+            files = output_.finish(path_);
+            fs::remove_all(path_, error);
         }
-        std::vector<fs::path> files = output_.finish(path_);
-        fs::remove_all(path_, error);
+        fs::remove(path_, error); // NFS keeps a file that is removed, and so its folder, until it is closed
         return files;
     }
 
 private:
+    [[nodiscard]] bool has(std::int64_t slab) const {
+        std::error_code error;
+        return fs::exists(mark_of(slab), error);
+    }
     [[nodiscard]] fs::path mark_of(std::int64_t slab) const { return path_ / ("done." + std::to_string(slab)); }
     [[nodiscard]] bool has_data() const {
         std::error_code error;
         return fs::exists(path_ / "data", error);
-    }
-    // True if some slab is done. A folder without a mark may be one that another process is just making.
-    [[nodiscard]] bool has_marks() const {
-        std::error_code error;
-        for (const fs::directory_entry& entry : fs::directory_iterator(path_, error))
-            if (entry.path().stem() == "done") return true;
-        return false;
     }
 
     const slab_output& output_;
@@ -142,18 +172,16 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
     const std::size_t num_targets = request.targets.size() - options.implied.size();
     const std::unique_ptr<slab_output> output =
         make_slab_output(options.outputs[0], shape_of(request, num_targets), options.write);
-    slab_folder folder(*output, work_of(options, options.input));
+    const slab_folder folder(*output, work_of(options, options.input));
     slab_outcome outcome;
     outcome.slabs = output->num_slabs();
 
-    std::vector<std::int64_t> mine;
+    std::vector<std::int64_t> share;
     std::vector<slabs::layer_range> all_ranges, ranges; // ranges: of `mine`
     for (std::int64_t s = 0; s < outcome.slabs; ++s) all_ranges.push_back(output->layers(s));
-    for (std::int64_t s = options.batch.rank; s < outcome.slabs; s += options.batch.world_size) {
-        if (folder.has(s)) continue;
-        mine.push_back(s);
-        ranges.push_back(all_ranges[static_cast<std::size_t>(s)]);
-    }
+    for (std::int64_t s = options.batch.rank; s < outcome.slabs; s += options.batch.world_size) share.push_back(s);
+    const std::vector<std::int64_t> mine = folder.begin(share);
+    for (const std::int64_t s : mine) ranges.push_back(all_ranges[static_cast<std::size_t>(s)]);
     voxelize_stats before;
     const auto write = [&](std::size_t i, sparse_volume&& bricks, const voxelize_stats& until) {
         bricks.channels.resize(num_targets);
@@ -183,10 +211,8 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
     } else {
         stats.triangles = source.stream != nullptr ? source.stream->num_triangles() : source.model.triangle_count();
     }
-    for (std::int64_t s = 0; s < outcome.slabs; ++s) outcome.left += folder.has(s) ? 0 : 1;
-    if (outcome.left != 0) return outcome;
     voxelize_stats all;
-    std::vector<fs::path> files = folder.finish(all);
+    std::vector<fs::path> files = folder.finish(all, outcome.left);
     if (files.empty()) return outcome;
     outcome.finished = true;
     for (const auto& [name, count] : kept_counts) stats.*count = all.*count;

@@ -6,6 +6,10 @@
 
 #include <gtest/gtest.h>
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -180,6 +184,51 @@ TEST(ToolSlabs, AKilledRunGoesOn) {
     EXPECT_NE(rest.err.find("drew " + std::to_string(40 - done) + " of 40 slabs"), std::string::npos) << rest.err;
     EXPECT_TRUE(t.unfinished().empty());
     expect_same_group(t, "whole.zarr", "m.zarr");
+}
+
+// Processes that come late, as those of slow hosts do: without a slab of their own, and while another process makes the
+// output.
+TEST(ToolSlabs, LateProcessesLeaveNothing) {
+    const tower t({});
+    for (const char* const rank : {"3", "1", "2", "0", "3"})
+        EXPECT_EQ(0, t.draw("m.zarr", {"--world-size", "4", "--rank", rank}).code);
+    EXPECT_TRUE(fs::exists(t.folder / "m.zarr"));
+    EXPECT_TRUE(t.unfinished().empty());
+
+    ASSERT_EQ(0, t.draw("n.zarr", {"--world-size", "2", "--rank", "0"}).code);
+    ASSERT_EQ(t.unfinished().size(), 1u);
+    const fs::path folder = t.unfinished()[0];
+    const int lock = ::open((folder / "lock").c_str(), O_RDWR | O_CLOEXEC);
+    ASSERT_GE(lock, 0);
+    ASSERT_EQ(0, ::flock(lock, LOCK_EX));
+    const pid_t late = t.begin("n.zarr", {"--world-size", "2", "--rank", "0"});
+    const auto waits = [&] { // "1: -> FLOCK  ADVISORY  WRITE 123 ..."
+        const std::string all = read_file("/proc/locks"), process = " " + std::to_string(late) + " ";
+        const std::size_t at = all.find(process);
+        return at != std::string::npos && all.rfind("->", at) > all.rfind('\n', at);
+    };
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!waits() && std::chrono::steady_clock::now() < end)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    EXPECT_TRUE(waits());
+    fs::remove_all(folder);
+    ::close(lock);
+    const outcome result = wait_for(t.folder, late);
+    EXPECT_EQ(0, result.code) << result.err;
+    EXPECT_NE(result.err.find("drew 0 of 3 slabs"), std::string::npos) << result.err;
+    EXPECT_TRUE(t.unfinished().empty());
+}
+
+// Without a lock two processes might make the output at once.
+TEST(ToolSlabs, AFolderWithoutALockIsRefused) {
+    const tower t({});
+    ASSERT_EQ(0, t.draw("m.zarr", {"--world-size", "2", "--rank", "0"}).code);
+    ASSERT_EQ(t.unfinished().size(), 1u);
+    fs::remove(t.unfinished()[0] / "lock");
+    fs::create_directory(t.unfinished()[0] / "lock");
+    const outcome result = t.draw("m.zarr", {"--resume"});
+    EXPECT_NE(0, result.code);
+    EXPECT_NE(result.err.find("lock: "), std::string::npos) << result.err;
 }
 
 // Blocks of levels reach over slabs.
