@@ -44,8 +44,8 @@ enum class repair : std::uint8_t {
 };
 
 // What repair::exterior and repair::vote take from the rest of the grid where a call draws a slab of it along z. Bits
-// of host memory: 64 voxels along x a word, from the slab's first one on, each row of words from a new word on; rows by
-// ascending y, then z. Not owned.
+// of host memory, on a GPU also of its own: 64 voxels along x a word, from the slab's first one on, each row of words
+// from a new word on; rows by ascending y, then z. Not owned.
 struct solid_slab {
     // exterior: the slab's voxels that are inside, which is all that is drawn (slabs/exterior.hpp). Like
     // solid_options::cones, they need a triangle to be drawn, whichever.

@@ -112,11 +112,12 @@ TEST(DeviceRepairs, Exteriors) {
             for (const int closing : {0, 1, 3}) {
                 SCOPED_TRACE(std::to_string(m.triangles.size()) + " triangles, moved by " + std::to_string(by.x) +
                              ", closing " + std::to_string(closing));
-                case_of_slabs{moved(m, by),
-                              box_grid({37, 26, 25}),
-                              {.repair = vp::repair::exterior, .closing = closing},
-                              closing == 1 ? 3 : 2}
-                    .expect_same();
+                case_of_slabs on_gpus{moved(m, by),
+                                      box_grid({37, 26, 25}),
+                                      {.repair = vp::repair::exterior, .closing = closing},
+                                      closing == 1 ? 3 : 2};
+                on_gpus.options.floods_on_host = by.z == places[1].z;
+                on_gpus.expect_same();
             }
 }
 
@@ -217,6 +218,7 @@ TEST(DeviceRepairs, ListsAndSparseResults) {
         slabs::device_options options;
         options.repair = repair;
         options.may_turn = false;
+        options.floods_on_host = true;
         options.memory = 4096;
         slabs::device_slabs drawn(gpus, g, view, vp::passthrough{}, options);
 

@@ -184,14 +184,12 @@ template <class Position>
     return out;
 }
 
-// The cones of one body: all its triangles, in whatever parts. Throws std::bad_alloc, or std::length_error for more
-// than 2^32 boundary vertices.
-[[nodiscard]] inline hole_cones close_holes(const std::vector<hole_part>& body, std::uint64_t max_hole_edges) {
+// The edges of one body that are left when opposite ones of the same two vertices have cancelled: all its triangles, in
+// whatever parts, whose vertices are numbered through. Throws std::bad_alloc.
+[[nodiscard]] inline std::vector<edge_chain::edge> open_edges(const std::vector<hole_part>& body) {
     // Most edges cancel between the vertices as the mesh numbers them; a sum of chains may be taken in any order.
-    std::vector<std::uint64_t> ends; // of each part's vertices, numbered through all parts
-    ends.reserve(body.size());
     std::uint64_t num_vertices = 0;
-    for (const hole_part& p : body) ends.push_back(num_vertices += p.num_vertices);
+    for (const hole_part& p : body) num_vertices += p.num_vertices;
     edge_chain all(num_vertices);
     const auto for_each_edge = [&](auto&& visit) {
         std::uint64_t first = 0;
@@ -211,11 +209,20 @@ template <class Position>
     for_each_edge([&](std::uint64_t a, std::uint64_t b) { all.count(a, b); });
     all.start();
     for_each_edge([&](std::uint64_t a, std::uint64_t b) { all.add(a, b); });
+    return all.boundary();
+}
+
+// The cones of one body. Throws std::bad_alloc, or std::length_error for more than 2^32 boundary vertices.
+[[nodiscard]] inline hole_cones close_holes(const std::vector<hole_part>& body, std::uint64_t max_hole_edges) {
+    std::vector<std::uint64_t> ends; // of each part's vertices
+    ends.reserve(body.size());
+    std::uint64_t num_vertices = 0;
+    for (const hole_part& p : body) ends.push_back(num_vertices += p.num_vertices);
     const auto position = [&](std::uint64_t v) {
         const auto part = static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), v) - ends.begin());
         return body[part].positions[v - (ends[part] - body[part].num_vertices)];
     };
-    return close_boundary(all.boundary(), position, max_hole_edges);
+    return close_boundary(open_edges(body), position, max_hole_edges);
 }
 
 // The same cones as a part of the whole grid sees them, whose first voxel is `offset` units (snap_transform) from its

@@ -87,6 +87,13 @@ public:
         });
     }
 
+    // Adds what another one has found, of the same slabs, before of().
+    void join(const column_parities& other) {
+        for (std::size_t i = 0; i < open_.size(); ++i) open_[i] ^= other.open_[i];
+        for (std::size_t s = 0; s < slabs_.size(); ++s)
+            for (std::size_t i = 0; i < open_.size(); ++i) below_[s][i] ^= other.below_[s][i];
+    }
+
     // What a slab's call takes, once all triangles are there. By ascending slabs; memory of those before is freed, and
     // the bits are there until the next one is asked for.
     [[nodiscard]] solid_slab of(std::size_t slab) {

@@ -14,6 +14,7 @@
 //   slabs.gather<0>(parts, whole).or_throw();                                  // from GPU to GPU
 
 #include <voxelpipe/slabs/device_bins.cuh>
+#include <voxelpipe/slabs/device_exterior.cuh>
 #include <voxelpipe/slabs/device_set.cuh>
 #include <voxelpipe/slabs/plan.hpp>
 #include <voxelpipe/slabs/resident_repairs.hpp>
@@ -49,7 +50,9 @@ struct device_options {
     // For draw_solid with this repair, which decides what triangles a slab needs; is_solid then, and slabs of vote and
     // exterior are along z.
     voxelpipe::repair repair = voxelpipe::repair::none;
-    // Bytes of host memory for the search of a repair, about; beyond them it takes temporary files of this folder.
+    // exterior: the host floods in any case, not only if the first GPU has no room for it.
+    bool floods_on_host = false;
+    // Bytes of host memory for that, about; beyond them it takes temporary files of this folder.
     std::uint64_t memory = std::uint64_t{1} << 30;
     std::string folder = "/tmp"; // of POSIX files
 };
@@ -111,16 +114,17 @@ public:
         });
     }
     // The same for solids, if device_options::is_solid: voxels, counts and counts of rows are those of one call.
-    // how.repair is that of device_options; how.cones and how.slab are found here, and not given. What a repair copies
-    // to host memory, and what it holds there as long as the object lives:
-    //   close_holes   copies all vertices, 24 bytes each, in the constructor, where one thread goes through all
-    //                 triangles; holds the boundaries of the holes and their cones, about 100 bytes a boundary edge
-    //   vote          copies the same; holds a layer of bits of the grid for each slab, and one more
-    //   exterior      copies the cover of each slab, which its GPU draws, 72 bytes a brick, where the host floods:
-    //                 the first call, and one with another `closing`; holds a bit a voxel of the whole grid. A
-    //                 crop is refused, as by one call (crop_without_whole)
-    // The search may take device_options::memory beside it, for exterior slab_exterior::least_bytes at least. Each call
-    // copies its slab's part of what is held to its GPU. Throws std::system_error of files.
+    // how.repair is that of device_options; how.cones and how.slab are found here, and not given. What a repair takes,
+    // and holds as long as the object lives:
+    //   close_holes   the constructor copies all vertices to host memory, 24 bytes each, where one thread goes through
+    //                 all triangles, in 24 bytes each; holds about 100 bytes a boundary edge there
+    //   vote          the same copy, and all threads; holds a layer of bits of the grid for each slab, and one more
+    //   exterior      the first call, and one with another `closing`: each GPU draws the cover of its slab, and the
+    //                 first one floods, in 2 bits a voxel of the whole grid, 4 with `closing`. Each GPU holds a bit a
+    //                 voxel of its slab. If there is no room, the host floods bricks, in device_options::memory and
+    //                 slab_exterior::least_bytes at least, which takes about 1000 times as long, and holds a bit a
+    //                 voxel of the whole grid. A crop is refused, as by one call (crop_without_whole)
+    // Each call copies its slab's part of what the host holds to its GPU. Throws std::system_error of files.
     template <class SolidShader, class Output>
     [[nodiscard]] status draw_solid(const SolidShader& shader, std::vector<Output>& outputs,
                                     const solid_options& how = {}) {
@@ -305,24 +309,37 @@ private:
     // What the repair of a call takes of all slabs.
     [[nodiscard]] status find_repair(const solid_options& how) {
         if (!repairs_) return {};
+        if (!repairs_->needs_walls(how)) return repairs_->find(how, {});
+        repairs_->drop_inside();
+        if (!options_.floods_on_host) {
+            const status s = exterior_.find(
+                grid_, slabs_, how.closing, [&](std::size_t count, const auto& work) { return on_each(count, work); },
+                [&](std::size_t i, cuda_backend& gpu, auto& cover) { return draw_cover(i, gpu, cover); });
+            for (std::size_t i = 0; s.ok() && i < size(); ++i)
+                repairs_->take_inside(how.closing, i, exterior_.inside(i));
+            if (s.ok() || s.code != status_code::out_of_memory) return s;
+        }
         using cover = sparse_framebuffer<cuda_backend, target<bit, blend::bit_or>>;
         std::vector<host_sparse<target<bit, blend::bit_or>>> covers(size());
-        if (repairs_->needs_walls(how)) {
-            voxelize_options conservative;
-            conservative.rule = coverage::conservative;
-            conservative.count_voxels = false;
-            const status s = on_each(size(), [&](std::size_t i, cuda_backend& gpu) {
-                const auto one = draw_of(meshes_[i]->view(), constant(true));
-                cover out(gpu, slabs_[i].where.extent);
-                status drawn = voxelize(gpu, std::span(&one, 1), slabs_[i].where, out, conservative);
-                if (drawn.ok()) covers[i] = out.to_host(gpu);
-                return drawn;
-            });
-            if (!s.ok()) return s;
-        }
+        const status s = on_each(size(), [&](std::size_t i, cuda_backend& gpu) {
+            cover out(gpu, slabs_[i].where.extent);
+            status drawn = draw_cover(i, gpu, out);
+            if (drawn.ok()) covers[i] = out.to_host(gpu);
+            return drawn;
+        });
+        if (!s.ok()) return s;
         std::vector<brick_table> walls;
         for (const auto& c : covers) walls.push_back(c.table());
         return repairs_->find(how, walls);
+    }
+    // The conservative cover of slab i.
+    template <class Output>
+    [[nodiscard]] status draw_cover(std::size_t i, cuda_backend& gpu, Output& out) const {
+        voxelize_options conservative;
+        conservative.rule = coverage::conservative;
+        conservative.count_voxels = false;
+        const auto one = draw_of(meshes_[i]->view(), constant(true));
+        return voxelize(gpu, std::span(&one, 1), slabs_[i].where, out, conservative);
     }
 
     template <class Shader, class Output, class Call>
@@ -370,6 +387,7 @@ private:
     std::vector<slab> slabs_;
     std::vector<std::unique_ptr<detail::binned_mesh<Attributes...>>> meshes_; // by GPU
     std::optional<detail::resident_repairs> repairs_;                         // none without a repair
+    detail::device_exterior exterior_;
 };
 
 } // namespace voxelpipe::slabs

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <tuple>
@@ -67,6 +68,13 @@ public:
     // std::length_error, too, as that does. Nothing is added later.
     [[nodiscard]] core::hole_cones finish(std::uint64_t max_hole_edges) { return close(take_edges(), max_hole_edges); }
 
+    // One edge; none from a position to itself.
+    [[nodiscard]] static std::optional<edge> edge_between(const core::snapped_position& from,
+                                                          const core::snapped_position& to) {
+        if (place(from) < place(to)) return edge{from, to, 1};
+        if (place(to) < place(from)) return edge{to, from, -1};
+        return std::nullopt;
+    }
     // Equal edges become one, and those whose sum is 0 none: edges of several finders may be joined.
     static void cancel(std::vector<edge>& edges) {
         std::sort(edges.begin(), edges.end(), [](const edge& a, const edge& b) { return place(a) < place(b); });
@@ -102,8 +110,7 @@ private:
             1 + 12 * num_triangles * sizeof(edge) / std::max<std::uint64_t>(budget, 1), 1, most));
     }
     void add_edge(const core::snapped_position& from, const core::snapped_position& to) {
-        if (place(from) < place(to)) fresh_.push_back({from, to, 1});
-        if (place(to) < place(from)) fresh_.push_back({to, from, -1});
+        if (const auto e = edge_between(from, to)) fresh_.push_back(*e);
     }
     // Most edges cancel between neighbours, which come one after the other; the others go to the bins.
     void sort_out() {

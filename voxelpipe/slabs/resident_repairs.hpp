@@ -14,6 +14,7 @@
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/core/holes.hpp>
 #include <voxelpipe/core/pack.hpp>
+#include <voxelpipe/core/threads.hpp>
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/slabs/columns.hpp>
 #include <voxelpipe/slabs/exterior.hpp>
@@ -40,7 +41,8 @@ public:
     // g: that all slabs together are, a crop or not. slabs: in order; along z, but for close_holes. budget: bytes for
     // the search, about; folder: for temporary files.
     resident_repairs(const grid& g, std::vector<grid> slabs, repair kind, std::uint64_t budget, std::string folder)
-        : grid_(g), slabs_(std::move(slabs)), kind_(kind), budget_(budget), folder_(std::move(folder)) {}
+        : grid_(g), slabs_(std::move(slabs)), kind_(kind), budget_(budget), folder_(std::move(folder)),
+          bits_(slabs_.size()) {}
 
     // True if all triangles are to be added.
     [[nodiscard]] static bool needs_triangles(repair kind) {
@@ -56,33 +58,8 @@ public:
     // All triangles of the mesh, wherever they lie, corners as they are drawn; their vertices are snapped in the grid,
     // and there. Once.
     void add(std::span<const core::snapped_position> vertices, const array_view<const glm::uvec3>& triangles) {
-        const auto for_each = [&](auto& to) {
-            for (std::size_t i = 0; i < triangles.size(); ++i) {
-                const glm::uvec3 t = triangles[i];
-                to.add(vertices[t.x], vertices[t.y], vertices[t.z]);
-            }
-        };
-        if (kind_ == repair::close_holes) {
-            hole_finder holes(triangles.size(), budget_, folder_);
-            for_each(holes);
-            edges_ = holes.take_edges();
-        }
-        if (kind_ == repair::vote) {
-            std::vector<layer_range> layers;
-            for (const grid& s : slabs_) {
-                const int first = s.offset.z - grid_.offset.z;
-                layers.push_back({first, first + s.extent.z});
-            }
-            column_parities columns(grid_, layers);
-            for_each(columns);
-            const std::size_t words =
-                (static_cast<std::size_t>(grid_.extent.x) + 63) / 64 * static_cast<std::size_t>(grid_.extent.y);
-            for (std::size_t s = 0; s < slabs_.size(); ++s) {
-                const solid_slab bits = columns.of(s);
-                below_.emplace_back(bits.below, bits.below + words);
-                if (s == 0) open_.assign(bits.open, bits.open + words);
-            }
-        }
+        if (kind_ == repair::close_holes) find_edges(vertices, triangles);
+        if (kind_ == repair::vote) find_columns(vertices, triangles);
     }
 
     // True if find() takes the cover of all slabs: not if the last one had the same `closing`.
@@ -104,21 +81,26 @@ public:
             closed_ = how.max_hole_edges;
         }
         if (needs_walls(how)) {
-            flooded_.reset();
-            inside_.clear();
+            drop_inside();
             slab_exterior outside(grid_.extent, how.closing, budget_, folder_,
                                   std::max(1u, std::thread::hardware_concurrency()));
             for (const brick_table& cover : covers) outside.add_walls(cover);
             outside.flood();
             for (const grid& s : slabs_) inside_.push_back(outside.inside(s.offset - grid_.offset, s.extent));
+            for (std::size_t s = 0; s < slabs_.size(); ++s) bits_[s].inside = inside_[s].data();
             flooded_ = how.closing;
         }
-        bits_.resize(slabs_.size());
-        for (std::size_t s = 0; s < slabs_.size(); ++s) {
-            if (kind_ == repair::exterior) bits_[s].inside = inside_[s].data();
-            if (kind_ == repair::vote) bits_[s].below = below_[s].data(), bits_[s].open = open_.data();
-        }
         return {};
+    }
+    // In place of find() with covers: what is inside slab s with this `closing` was found elsewhere. It is not owned,
+    // and read until drop_inside().
+    void take_inside(int closing, std::size_t s, const std::uint64_t* inside) {
+        bits_[s].inside = inside;
+        flooded_ = closing;
+    }
+    void drop_inside() {
+        flooded_.reset();
+        inside_.clear();
     }
     // The options of a slab's call, valid until the next find(). Several threads may ask.
     [[nodiscard]] solid_options of(std::size_t slab, solid_options how) const {
@@ -138,6 +120,47 @@ public:
     }
 
 private:
+    void find_edges(std::span<const core::snapped_position> vertices, const array_view<const glm::uvec3>& triangles) {
+        const auto count = static_cast<std::uint32_t>(triangles.size());
+        const std::vector<core::hole_part> body{{vertices.data(),
+                                                 vertices.size(),
+                                                 {triangles.data(), count, static_cast<std::uint32_t>(vertices.size())},
+                                                 count}};
+        for (const core::edge_chain::edge& e : core::open_edges(body))
+            if (const auto found = hole_finder::edge_between(vertices[e.from], vertices[e.to]))
+                edges_.push_back(*found);
+        hole_finder::cancel(edges_);
+    }
+    void find_columns(std::span<const core::snapped_position> vertices, const array_view<const glm::uvec3>& triangles) {
+        std::vector<layer_range> layers;
+        for (const grid& s : slabs_) {
+            const int first = s.offset.z - grid_.offset.z;
+            layers.push_back({first, first + s.extent.z});
+        }
+        // Each thread has its share of the triangles, and bits of its own.
+        const double room = static_cast<double>(budget_) / column_parities::bytes(grid_, slabs_.size());
+        const auto most = static_cast<unsigned>(std::clamp(room, 1.0, 256.0));
+        const unsigned threads = std::clamp(std::thread::hardware_concurrency(), 1u, most);
+        std::vector<column_parities> found(threads, column_parities(grid_, layers));
+        constexpr std::size_t share = 4096;
+        core::parallel_for(threads, (triangles.size() + share - 1) / share, [&](unsigned thread, std::size_t block) {
+            const std::size_t end = std::min(triangles.size(), (block + 1) * share);
+            for (std::size_t i = block * share; i < end; ++i) {
+                const glm::uvec3 t = triangles[i];
+                found[thread].add(vertices[t.x], vertices[t.y], vertices[t.z]);
+            }
+        });
+        for (unsigned t = 1; t < threads; ++t) found[0].join(found[t]);
+        const std::size_t words =
+            (static_cast<std::size_t>(grid_.extent.x) + 63) / 64 * static_cast<std::size_t>(grid_.extent.y);
+        for (std::size_t s = 0; s < slabs_.size(); ++s) {
+            const solid_slab bits = found[0].of(s);
+            below_.emplace_back(bits.below, bits.below + words);
+            if (s == 0) open_.assign(bits.open, bits.open + words);
+        }
+        for (std::size_t s = 0; s < slabs_.size(); ++s) bits_[s].below = below_[s].data(), bits_[s].open = open_.data();
+    }
+
     grid grid_;
     std::vector<grid> slabs_;
     repair kind_;

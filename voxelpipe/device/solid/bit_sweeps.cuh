@@ -37,13 +37,25 @@ struct bit_box {
     }
 };
 
-// Copies the lowest layers of a box from host memory, where a row begins with a new word of 64 bits (solid_slab).
-inline void copy_rows_to_device(word* to, const std::uint64_t* from, const bit_box& box, int layers,
-                                cudaStream_t stream) {
-    const std::size_t row = box.words_x() * sizeof(word), host_row = (row + 7) / 8 * 8;
-    check(cudaMemcpy2DAsync(to, row, from, host_row, row,
+// Rows of a solid_slab begin with a new word of 64 bits: the words of a row, and of a box.
+[[nodiscard]] inline std::size_t slab_words_x(const bit_box& box) { return (box.words_x() + 1) / 2; }
+[[nodiscard]] inline std::size_t slab_words(const bit_box& box) {
+    return slab_words_x(box) * static_cast<std::size_t>(box.extent.y) * static_cast<std::size_t>(box.extent.z);
+}
+// Copies the lowest layers of a box from a solid_slab's rows, which lie in host memory or this GPU's.
+inline void copy_from_slab(word* to, const std::uint64_t* from, const bit_box& box, int layers, cudaStream_t stream) {
+    const std::size_t row = box.words_x() * sizeof(word);
+    check(cudaMemcpy2DAsync(to, row, from, slab_words_x(box) * sizeof(std::uint64_t), row,
                             static_cast<std::size_t>(box.extent.y) * static_cast<std::size_t>(layers),
-                            cudaMemcpyHostToDevice, stream),
+                            cudaMemcpyDefault, stream),
+          stage::fine_raster);
+}
+// Copies a box to such rows in this GPU's memory.
+inline void copy_to_slab(std::uint64_t* to, const word* from, const bit_box& box, cudaStream_t stream) {
+    const std::size_t row = box.words_x() * sizeof(word);
+    check(cudaMemcpy2DAsync(to, slab_words_x(box) * sizeof(std::uint64_t), from, row, row,
+                            static_cast<std::size_t>(box.extent.y) * static_cast<std::size_t>(box.extent.z),
+                            cudaMemcpyDefault, stream),
           stage::fine_raster);
 }
 

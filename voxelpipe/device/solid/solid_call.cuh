@@ -246,7 +246,7 @@ private:
             cover_body(m, geo, geometry_of, body, first, last, state, stream);
             if (plan.options.repair == repair::exterior && plan.options.slab != nullptr) {
                 // The cover has counted the triangles; the inside is known.
-                copy_rows_to_device(m.cover.mask, plan.options.slab->inside, {plan.g.extent}, plan.g.extent.z, stream);
+                copy_from_slab(m.cover.mask, plan.options.slab->inside, {plan.g.extent}, plan.g.extent.z, stream);
             } else if (plan.options.repair == repair::exterior) {
                 fill_to_exterior(m.exterior, m.cover.mask, stream);
             } else {

@@ -180,8 +180,8 @@ void add_votes(const vote_memory& m, const stored_triangles& source, std::uint32
     const parity_masks& masks = m.masks;
     masks.clear(box, stream);
     if (slab != nullptr) {
-        copy_rows_to_device(masks.inside[2], slab->below, box, 1, stream);
-        copy_rows_to_device(masks.open[2], slab->open, box, 1, stream);
+        copy_from_slab(masks.inside[2], slab->below, box, 1, stream);
+        copy_from_slab(masks.open[2], slab->open, box, 1, stream);
     }
     const unsigned blocks = fill_device(std::uint64_t{num_triangles} * 32, 4);
     const auto toggle = [&]<int Axis>() {
