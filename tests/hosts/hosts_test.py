@@ -33,8 +33,8 @@ def run(*command, check=True, **how):
 
 
 def run_ranks(program, last_line, **how):
-    """A program of MPI, a rank on each host. It has done its work when it has printed its last line; MPICH before 4.2 may
-    wait for ever in MPI_Finalize after that, over UCX and TCP (github.com/pmodels/mpich, pull request 6596)."""
+    """A program of MPI, a rank on each host. It has done its work when it has printed its last line; MPICH 4.0.2 may wait
+    for ever in MPI_Finalize after that, over UCX and TCP (github.com/pmodels/mpich, pull request 6596)."""
     with open(how["cwd"] / "output", "w+") as output:
         job = subprocess.Popen(["mpiexec", "-n", str(len(HOSTS)), str(program)], stdin=subprocess.DEVNULL, stdout=output,
                                stderr=subprocess.STDOUT, **how)
