@@ -110,6 +110,22 @@ TEST(Memory, WorkOnBricksKeepsWithinALittle) {
     EXPECT_TRUE(read_file(folder / "tight.nvdb") == read_file(folder / "free.nvdb"));
 }
 
+// A solid that is decided in slabs has 30 MiB of bricks, which are joined at the end.
+TEST(Memory, ValuesOfSlabsAreHeldOnce) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    builder file;
+    gltf_test::add_cube(file, {0, 0, 0}, 1, gltf_test::add_material(file, {0.9, 0.2, 0.1, 1}));
+    file.write_glb(folder / "m.glb");
+    const two_ways runs{folder, folder / "m.glb", {"-r", "400", "-t", "color", "--solid", "exterior", "--sparse"}};
+    const outcome tight = runs.draw("tight.nvdb", {"--max-memory", "60"}), free = runs.draw("free.nvdb");
+    ASSERT_EQ(0, tight.code) << tight.err;
+    ASSERT_EQ(0, free.code) << free.err;
+    EXPECT_GT(56U << 20, json::parse(tight.out)["peak_memory_bytes"].get<std::uint64_t>());
+    EXPECT_LT(1, json::parse(tight.out).value("slabs", 0));
+    EXPECT_TRUE(read_file(folder / "tight.nvdb") == read_file(folder / "free.nvdb"));
+}
+
 TEST(Memory, InstancesAreNotCopied) {
     const scratch_folder folder;
     builder file;

@@ -10,6 +10,7 @@
 #include <voxelpipe/sparse_merge.hpp>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
 #include <memory>
@@ -62,6 +63,9 @@ private:
     std::vector<std::uint32_t> slots_;
 };
 
+// Bytes of a value; 0 of bits.
+std::size_t value_bytes(const channel& c) { return size_of(c.type) * static_cast<std::size_t>(c.components); }
+
 // Sets voxels of a brick along x, bit by bit.
 void add_row(voxelpipe::brick_mask& mask, int y, int z, std::uint32_t bits) {
     const auto at = static_cast<unsigned>(voxelpipe::core::morton_key(0, y, z));
@@ -104,6 +108,16 @@ volume as_dense(const sparse_volume& v, std::span<const channel> channels) {
 
 sparse_volume join_slabs(std::vector<sparse_volume>&& parts) {
     if (parts.size() == 1) return std::move(parts.front());
+    const std::vector<sparse_volume>& from = parts;
+    return join_slabs(std::move(parts),
+                      [&](std::size_t part, std::size_t c, std::uint64_t first, std::uint64_t count, std::byte* to) {
+                          const channel& values = from[part].channels[c];
+                          const std::size_t size = value_bytes(values);
+                          std::memcpy(to, values.data.data() + first * size, static_cast<std::size_t>(count) * size);
+                      });
+}
+
+sparse_volume join_slabs(std::vector<sparse_volume>&& parts, const slab_reader& read) {
     struct place {
         std::uint64_t key;
         std::uint32_t part, brick;
@@ -124,16 +138,13 @@ sparse_volume join_slabs(std::vector<sparse_volume>&& parts) {
     std::sort(places.begin(), places.end(), [](const place& a, const place& b) { return a.key < b.key; });
     std::sort(tiles.begin(), tiles.end(),
               [](const tile_place& a, const tile_place& b) { return a.tile.bits < b.tile.bits; });
-    const auto value_of = [&](const tile_place& at, std::size_t c, std::size_t size) {
-        return parts[at.part].channels[c].data.data() + at.rank * size;
-    };
-    const auto size_of_channel = [](const channel& c) {
-        return size_of(c.type) * static_cast<std::size_t>(c.components);
-    };
     tiles = voxelpipe::core::join_siblings(std::move(tiles), [&](const tile_place& a, const tile_place& b) {
         for (std::size_t c = 0; c < parts.front().channels.size(); ++c) {
-            const std::size_t size = size_of_channel(parts.front().channels[c]);
-            if (size != 0 && std::memcmp(value_of(a, c, size), value_of(b, c, size), size) != 0) return false;
+            std::array<std::byte, 16> of_a{}, of_b{};
+            if (value_bytes(parts.front().channels[c]) == 0) continue;
+            read(a.part, c, a.rank, 1, of_a.data());
+            read(b.part, c, b.rank, 1, of_b.data());
+            if (of_a != of_b) return false;
         }
         return true;
     });
@@ -148,25 +159,25 @@ sparse_volume join_slabs(std::vector<sparse_volume>&& parts) {
         rank += result.masks.back().count();
     }
     if (!places.empty()) result.offsets.push_back(rank);
+    for (sparse_volume& from : parts) {
+        from.keys = decltype(from.keys)(); // = {} would keep the memory
+        from.masks = decltype(from.masks)();
+    }
     for (std::size_t c = 0; c < parts.front().channels.size(); ++c) {
         const channel& like = parts.front().channels[c];
         channel to{like.name, like.type, like.components, {}};
-        const std::size_t size = size_of_channel(to);
+        const std::size_t size = value_bytes(to); // 0 of bits: every voxel here has them
         to.data.resize(static_cast<std::size_t>(rank + tiles.size()) * size);
         std::byte* out = to.data.data();
+        const auto copy = [&](std::size_t part, std::uint64_t first, std::uint64_t count) {
+            if (size != 0) read(part, c, first, count, out);
+            out += count * size;
+        };
         for (const place& at : places) {
-            if (size == 0) break; // of bits: every voxel here has them
-            const sparse_volume& from = parts[at.part];
-            const std::uint64_t first = from.offsets[at.brick], last = from.offsets[at.brick + 1];
-            std::memcpy(out, from.channels[c].data.data() + first * size,
-                        static_cast<std::size_t>(last - first) * size);
-            out += (last - first) * size;
+            const std::vector<std::uint64_t>& offsets = parts[at.part].offsets;
+            copy(at.part, offsets[at.brick], offsets[at.brick + 1] - offsets[at.brick]);
         }
-        for (const tile_place& at : tiles) {
-            if (size == 0) break;
-            std::memcpy(out, value_of(at, c, size), size);
-            out += size;
-        }
+        for (const tile_place& at : tiles) copy(at.part, at.rank, 1);
         for (sparse_volume& from : parts) from.channels[c].data = channel_bytes();
         result.channels.push_back(std::move(to));
     }

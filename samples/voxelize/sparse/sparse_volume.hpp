@@ -14,6 +14,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -67,6 +68,12 @@ struct sparse_volume {
 // One volume of parts of one grid that share no brick; they have the same channels, which are freed one by one. Tiles
 // that meet are joined as those of a whole are.
 [[nodiscard]] sparse_volume join_slabs(std::vector<sparse_volume>&& parts);
+// Copies values of a part's channel: `count` of them from number `first` on.
+using slab_reader =
+    std::function<void(std::size_t part, std::size_t channel, std::uint64_t first, std::uint64_t count, std::byte* to)>;
+// The same for parts whose channels hold no data. Each value is read once, or a few times if it is a tile's; those of a
+// part's channel ascend.
+[[nodiscard]] sparse_volume join_slabs(std::vector<sparse_volume>&& parts, const slab_reader& read);
 
 // The same volume, in which those of `keys`, ascending, that lie in tiles are bricks; without keys, all bricks of
 // tiles.

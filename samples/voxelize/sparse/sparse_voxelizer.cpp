@@ -6,6 +6,7 @@
 #include "../memory.hpp"
 #include "../parallel.hpp"
 #include "loaded_slabs.hpp"
+#include "slab_joiner.hpp"
 #include "sparse_formats.hpp"
 #include "sparse_pipeline.hpp"
 #include "streamed_model.hpp"
@@ -134,14 +135,15 @@ sparse_volume draw_in_slabs(scene&& model, const voxelize_request& request, cons
     const int depth = std::max(1, static_cast<int>(fits) / brick) * brick;
     std::vector<slabs::layer_range> all;
     for (int begin = 0; begin < layers; begin += depth) all.push_back({begin, std::min(layers, begin + depth)});
-    loaded_slabs of_model(std::move(model), request, all, all.size(), folder);
-    std::vector<sparse_volume> parts;
-    parts.reserve(all.size());
-    for (const slabs::layer_range& part : all) parts.push_back(of_model.draw(part, stats));
+    slab_joiner joined(all.size(), folder);
+    {
+        loaded_slabs of_model(std::move(model), request, all, all.size(), folder);
+        for (const slabs::layer_range& part : all) joined.add(of_model.draw(part, stats));
+    }
     warn_of_parts(stats, request);
     if (std::string text = flood_warning(*request.solid, *stats.solid, stats.voxels); !text.empty())
         stats.warnings.push_back(std::move(text));
-    return join_slabs(std::move(parts));
+    return joined.finish();
 }
 
 } // namespace

@@ -6,6 +6,7 @@
 #include "../memory.hpp"
 #include "../parallel.hpp"
 #include "../placement.hpp"
+#include "slab_joiner.hpp"
 #include "sparse_voxelizer.hpp"
 #include "streamed_holes.hpp"
 #include "streamed_repairs.hpp"
@@ -223,7 +224,10 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
         }
         std::erase_if(parts, [](const auto& part) { return part.range == streamed_slab<Varyings>::no_range; });
         for (std::size_t r = 0, s = 0; r < ranges.size(); ++r) {
-            std::vector<sparse_volume> of_range;
+            const auto num_parts =
+                std::count_if(parts.begin(), parts.end(), [&](const auto& p) { return p.range == r; });
+            slab_joiner of_range(static_cast<std::size_t>(num_parts), place.folder);
+            bool any = false; // triangle is there
             for (; s < parts.size() && parts[s].range == r; ++s) {
                 const auto [begin, end] = drawn_layers(parts[s].layers);
                 add_parts(parts[s].parts, holes.parts());
@@ -247,13 +251,13 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
                 const std::vector<vp::core::hole_cones> cones = holes.of_bodies(numbers);
                 if (!cones.empty()) part.solid->cones = cones.data();
                 voxelize_stats of_part;
-                of_range.push_back(sparse_drawer(std::move(of_slab), part).draw(part, of_part));
+                of_range.add(sparse_drawer(std::move(of_slab), part).draw(part, of_part));
+                any = true;
                 holes.count(of_part);
                 add_part(stats, of_part);
                 ++stats.slabs;
             }
-            if (of_range.empty()) of_range.push_back(empty_bricks(request)); // no triangle is there
-            sink(r, of_range.size() == 1 ? std::move(of_range[0]) : join_slabs(std::move(of_range)));
+            sink(r, any ? of_range.finish() : empty_bricks(request));
         }
         holes.count(stats);
         warn_of_parts(stats, request);
