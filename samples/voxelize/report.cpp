@@ -77,6 +77,7 @@ void print_text(std::ostream& stream, const run_report& report) {
     else if (!report.stats.estimate.empty())
         stream << " (auto: " << report.stats.estimate << ')';
     stream << '\n';
+    if (report.stats.pass_slabs) line("drawn for passes") << *report.stats.pass_slabs << " slabs\n";
     if (report.stats.strategy.value != voxelpipe::strategy::automatic)
         line("strategy") << to_string(report.stats.strategy.value) << " (" << report.stats.strategy.why << ")\n";
     line("triangles") << report.stats.triangles;
@@ -148,6 +149,7 @@ void print_json(std::ostream& stream, const run_report& report) {
     if (!report.stats.estimate.empty()) root["estimate"] = report.stats.estimate;
     root["threads"] = report.stats.threads;
     root["slabs"] = report.stats.slabs;
+    if (report.stats.pass_slabs) root["pass_slabs"] = *report.stats.pass_slabs;
     root["triangles"] = report.stats.triangles;
     root["triangles_dropped"] = report.stats.triangles_dropped;
     if (report.stats.lines != 0) {

@@ -5,6 +5,7 @@
 #include "batch.hpp"
 #include "formats/output_file.hpp"
 #include "memory.hpp"
+#include "pass_files.hpp"
 #include "slab_output.hpp"
 #include "sparse/loaded_slabs.hpp"
 
@@ -177,31 +178,33 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
     outcome.slabs = output->num_slabs();
 
     std::vector<std::int64_t> share;
-    std::vector<slabs::layer_range> all_ranges, ranges; // ranges: of `mine`
-    for (std::int64_t s = 0; s < outcome.slabs; ++s) all_ranges.push_back(output->layers(s));
+    std::vector<slabs::layer_range> ranges;
+    for (std::int64_t s = 0; s < outcome.slabs; ++s) ranges.push_back(output->layers(s));
     for (std::int64_t s = options.batch.rank; s < outcome.slabs; s += options.batch.world_size) share.push_back(s);
-    const std::vector<std::int64_t> mine = folder.begin(share);
-    for (const std::int64_t s : mine) ranges.push_back(all_ranges[static_cast<std::size_t>(s)]);
+    const std::vector<std::int64_t> missing = folder.begin(share);
+    const std::vector<std::size_t> mine(missing.begin(), missing.end());
+    const pass_files passes(folder.path(),
+                            static_cast<std::size_t>(outcome.slabs * options.batch.rank / options.batch.world_size));
     voxelize_stats before;
     const auto write = [&](std::size_t i, sparse_volume&& bricks, const voxelize_stats& until) {
         bricks.channels.resize(num_targets);
         if (!bricks.tiles.empty()) bricks = open_tiles(bricks);
-        output->write(folder.path(), mine[i], as_dense(bricks, bricks.channels));
+        output->write(folder.path(), missing[i], as_dense(bricks, bricks.channels));
         voxelize_stats counts;
         for (const auto& [name, count] : kept_counts) counts.*count = until.*count - before.*count;
         before = until;
-        folder.mark(mine[i], counts);
+        folder.mark(missing[i], counts);
         ++outcome.drawn;
     };
     voxelize_stats& stats = report.stats;
-    if (source.stream != nullptr && !ranges.empty()) {
-        draw_streamed(*source.stream, source.place, request, ranges, stats,
+    if (source.stream != nullptr && !mine.empty()) {
+        draw_streamed(*source.stream, source.place, request, {ranges, mine, &passes}, stats,
                       [&](std::size_t i, sparse_volume&& bricks) { write(i, std::move(bricks), stats); });
-    } else if (!ranges.empty()) {
+    } else if (!mine.empty()) {
         const std::filesystem::path& place = source.place.folder;
         try {
-            loaded_slabs model(std::move(source.model), request, all_ranges, ranges.size(), place);
-            for (std::size_t i = 0; i < ranges.size(); ++i) write(i, model.draw(ranges[i], stats), stats);
+            loaded_slabs model(std::move(source.model), request, ranges, mine, place, &passes, stats);
+            for (std::size_t i = 0; i < mine.size(); ++i) write(i, model.draw(ranges[mine[i]], stats), stats);
             warn_of_parts(stats, request);
         } catch (const std::system_error& error) {
             throw write_error(place, "temporary files for a flood: " + error.code().message());

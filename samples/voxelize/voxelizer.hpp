@@ -90,6 +90,8 @@ struct voxelize_stats {
     std::uint64_t device_memory = 0;     // the most that was held there, in bytes
     int threads = 0;                     // on the CPU
     int slabs = 0;
+    // Slabs drawn for passes over all of them, where processes and later runs share these; none: they share none.
+    std::optional<std::uint64_t> pass_slabs;
     std::uint64_t triangles = 0;
     std::uint64_t lines = 0;               // and points
     std::uint64_t triangles_dropped = 0;   // a position that is not finite, or too far from the grid to be snapped

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One model drawn and written slab by slab: by several processes, and by one that is stopped and run again. The folder
 // is that of a run which does it at once, byte for byte.
-#include "tool_test.hpp"
+#include "tower.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,93 +11,18 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <cmath>
 #include <csignal>
-#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 using namespace tool_test;
 namespace fs = std::filesystem;
 
 namespace {
-
-// A closed tower that turns as it rises, with a colour: with 60 floors, three slabs of 256 layers at 12 x 12 x 600
-// voxels.
-void write_tower(const fs::path& path, int floors) {
-    constexpr int sides = 8;
-    std::vector<float> positions;
-    std::vector<std::uint32_t> indices;
-    for (int f = 0; f <= floors; ++f)
-        for (int s = 0; s < sides; ++s) {
-            const double a = 6.283185307179586 * s / sides + 0.05 * f;
-            positions.insert(positions.end(), {static_cast<float>(5 + 5 * std::cos(a)),
-                                               static_cast<float>(5 + 5 * std::sin(a)), static_cast<float>(10 * f)});
-        }
-    const auto at = [](int f, int s) { return static_cast<std::uint32_t>(f * sides + s % sides); };
-    for (int s = 0; s < sides; ++s)
-        for (int f = 0; f < floors; ++f)
-            indices.insert(indices.end(),
-                           {at(f, s), at(f, s + 1), at(f + 1, s), at(f, s + 1), at(f + 1, s + 1), at(f + 1, s)});
-    for (int s = 1; s + 1 < sides; ++s) {
-        indices.insert(indices.end(), {at(0, 0), at(0, s + 1), at(0, s)});
-        indices.insert(indices.end(), {at(floors, 0), at(floors, s), at(floors, s + 1)});
-    }
-    builder file;
-    const int index_accessor = file.accessor(indices, "SCALAR");
-    json& primitive = file.mesh({{"POSITION", file.accessor(positions, "VEC3")}});
-    primitive["indices"] = index_accessor;
-    primitive["material"] = 0;
-    file.root["materials"] = {{{"pbrMetallicRoughness", {{"baseColorFactor", {0.8, 0.3, 0.1, 1}}}}}};
-    file.write_glb(path);
-}
-
-// Every file below a folder, by its path in it.
-std::map<std::string, std::string> files_of(const fs::path& folder) {
-    std::map<std::string, std::string> files;
-    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
-        if (entry.is_regular_file()) files[fs::relative(entry.path(), folder).string()] = read_file(entry.path());
-    return files;
-}
-
-struct tower {
-    scratch_folder folder;
-    std::vector<std::string> how;
-    int floors;
-
-    explicit tower(std::vector<std::string> how_, int floors_ = 60) : how(std::move(how_)), floors(floors_) {
-        write_tower(folder / "m.glb", floors);
-    }
-    [[nodiscard]] pid_t begin(const std::string& out, const std::vector<std::string>& more) const {
-        std::vector<std::string> arguments{
-            folder / "m.glb", "-o", folder / out, "-r", std::to_string(10 * floors), "-j", "2"};
-        arguments.insert(arguments.end(), how.begin(), how.end());
-        arguments.insert(arguments.end(), more.begin(), more.end());
-        return start(folder, arguments);
-    }
-    [[nodiscard]] outcome draw(const std::string& out, const std::vector<std::string>& more) const {
-        return wait_for(folder, begin(out, more));
-    }
-    // The folders of slabs that are there.
-    [[nodiscard]] std::vector<fs::path> unfinished() const {
-        std::vector<fs::path> found;
-        for (const fs::directory_entry& entry : fs::directory_iterator(folder.path()))
-            if (entry.path().extension() == ".slabs") found.push_back(entry.path());
-        return found;
-    }
-};
-
-void expect_same_group(const tower& t, const std::string& a, const std::string& b) {
-    const auto x = files_of(t.folder / a), y = files_of(t.folder / b);
-    EXPECT_GT(x.size(), 4u);
-    EXPECT_TRUE(x == y) << x.size() << " and " << y.size() << " files";
-}
 
 TEST(ToolSlabs, ProcessesShareOneModel) {
     const tower t({"-t", "occupancy,count,normal,color,color-outer", "--sparse", "--padding", "2"});
@@ -271,10 +196,6 @@ TEST(ToolSlabs, SolidsAndTheirHoles) {
     const outcome parts = t.draw("parts.zarr", {"--resume"});
     EXPECT_EQ(0, parts.code) << parts.err;
     expect_same_group(t, "whole.zarr", "parts.zarr");
-    const tower flood({"--solid", "exterior", "--sparse"});
-    ASSERT_EQ(0, flood.draw("whole.zarr", {}).code);
-    EXPECT_EQ(0, flood.draw("parts.zarr", {"--resume"}).code);
-    expect_same_group(flood, "whole.zarr", "parts.zarr");
 }
 
 TEST(ToolSlabs, SaysWhatCannotBeDoneBySlabs) {

@@ -103,6 +103,8 @@ void expect_same_pieces(const two_ways& model, const std::vector<std::string>& m
         const outcome part = model.draw("parts/m.pvti", more);
         ASSERT_EQ(0, part.code) << part.err;
         EXPECT_EQ(!memory.empty(), part.err.find(" triangles do not fit") != std::string::npos) << part.err;
+        // The first process has drawn all slabs for the passes.
+        EXPECT_EQ(*rank == '0', json::parse(part.out).value("pass_slabs", -1) == 0) << part.out;
     }
     std::size_t files = 0;
     for (const fs::directory_entry& entry : fs::directory_iterator(model.folder.path() / "free")) {

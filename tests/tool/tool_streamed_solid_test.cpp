@@ -167,6 +167,9 @@ TEST(StreamedSolids, TilesAndSharedSlabs) {
                 "tight/m.pvti", {little[0], little[1], "--pieces", "3", "--world-size", "2", "--rank", rank});
             ASSERT_EQ(0, part.code) << part.err;
             EXPECT_NE(std::string::npos, part.err.find(" triangles do not fit")) << part.err;
+            // The first process has drawn the walls of all slabs.
+            const int drawn = rule[0] != "exterior" ? -1 : *rank == '0' ? 0 : 3;
+            EXPECT_EQ(drawn, json::parse(part.out).value("pass_slabs", -1));
         }
         std::size_t files = 0;
         for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder.path() / "free")) {

@@ -3,13 +3,9 @@
 #include "loaded_slabs.hpp"
 
 #include "../memory.hpp"
-#include "../parallel.hpp"
 #include "streamed_model.hpp"
 
-#include <voxelpipe/solid.hpp>
-
 #include <algorithm>
-#include <cstdint>
 #include <utility>
 
 namespace voxelize {
@@ -17,26 +13,21 @@ namespace voxelize {
 namespace slabs = voxelpipe::slabs;
 
 loaded_slabs::loaded_slabs(scene&& model, const voxelize_request& request, std::span<const slabs::layer_range> all,
-                           std::size_t num_drawn, const std::filesystem::path& folder)
-    : request_(request), colors_(request), model_(std::move(model), request) {
-    const bool floods = request.solid && request.solid->rule == solid_rule::exterior;
-    const auto passes = static_cast<std::size_t>(colors_.num_passes());
-    steps_ = all.size() * (passes + (floods ? 1 : 0)) + num_drawn;
-    if (floods) {
-        const glm::ivec3 extent = request.grid.extent;
-        memory::require(voxelpipe::slabs::slab_exterior::least_bytes(extent, request.solid->closing),
-                        "the flood of --solid exterior");
-        exterior_.emplace(extent, request.solid->closing, static_cast<std::uint64_t>(memory::room() / 8),
-                          folder.string(), static_cast<unsigned>(thread_count(request.threads)));
-        for (const slabs::layer_range& layers : all) // those in the padding are walls, too
-            exterior_->add_walls(
-                model_.walls(next_step(request.grid.crop({0, 0, layers.begin}, {extent.x, extent.y, layers.size()})))
-                    .table());
-        exterior_->flood();
-    }
-    for (int pass = 0; pass < colors_.num_passes(); ++pass)
-        for (const slabs::layer_range& layers : all)
-            if (const auto part = without_padding(layers)) colors_.add(pass, model_, next_step(*part));
+                           std::span<const std::size_t> drawn, const std::filesystem::path& folder,
+                           const pass_files* kept, voxelize_stats& stats)
+    : request_(request), model_(std::move(model), request),
+      passes_(request_, all, drawn, static_cast<double>(memory::room()), folder, kept), steps_(drawn.size()) {
+    for (std::size_t s = 0; s < all.size(); ++s) steps_ += static_cast<std::size_t>(passes_.left_of(s));
+    const glm::ivec3 extent = request.grid.extent;
+    passes_.run(
+        [&](slab_pass pass, std::size_t slab) {
+            const auto [begin, end] = all[slab];
+            const std::optional<voxelpipe::grid> grid =
+                pass == slab_pass::walls ? request.grid.crop({0, 0, begin}, {extent.x, extent.y, end - begin})
+                                         : without_padding(all[slab]);
+            if (grid) passes_.add(pass, passes_.draw(pass, model_, next_step(*grid)));
+        },
+        stats);
 }
 
 std::optional<voxelpipe::grid> loaded_slabs::without_padding(const slabs::layer_range& layers) const {
@@ -62,14 +53,7 @@ sparse_volume loaded_slabs::draw(const slabs::layer_range& layers, voxelize_stat
     const std::optional<voxelpipe::grid> grid = without_padding(layers);
     if (!grid) return empty_bricks(request_);
     voxelize_request part = next_step(*grid);
-    colors_.give_to(part);
-    std::optional<voxelpipe::core::bit_grid> inside;
-    voxelpipe::solid_slab decided;
-    if (exterior_) {
-        inside = exterior_->inside(grid->offset, grid->extent);
-        decided.inside = inside->data();
-        part.solid->slab = &decided;
-    }
+    passes_.give_to(part);
     voxelize_stats of_part;
     sparse_volume bricks = model_.draw(part, of_part);
     add_part(stats, of_part);

@@ -3,15 +3,14 @@
 #pragma once
 
 // A loaded model that is drawn slab by slab into bricks. The model is held once, and what the slabs need of each other
-// is found before the first of them: the flood of --solid exterior and the colours of whole_colors.hpp.
+// is found before the first of them, by slab_passes.hpp.
 
 #include "../scene.hpp"
 #include "../voxelizer.hpp"
+#include "slab_passes.hpp"
 #include "sparse_volume.hpp"
 #include "sparse_voxelizer.hpp"
-#include "whole_colors.hpp"
 
-#include <voxelpipe/slabs/exterior.hpp>
 #include <voxelpipe/slabs/plan.hpp>
 
 #include <cstddef>
@@ -23,13 +22,12 @@ namespace voxelize {
 
 class loaded_slabs {
 public:
-    // all: layers that ascend and make up the request's grid. num_drawn: how many draw() will be called for, for the
-    // progress. folder: for temporary files. Throws memory_error, std::bad_alloc, and std::system_error of files.
+    // all, drawn, folder, kept: as slab_passes has them. Adds the times of the passes. Throws as they do.
     loaded_slabs(scene&& model, const voxelize_request& request, std::span<const voxelpipe::slabs::layer_range> all,
-                 std::size_t num_drawn, const std::filesystem::path& folder);
+                 std::span<const std::size_t> drawn, const std::filesystem::path& folder, const pass_files* kept,
+                 voxelize_stats& stats);
 
-    // Some layers of the grid; cheapest in ascending order. Adds their counts, and warnings
-    // about the model.
+    // One of the slabs that are drawn, in their order. Adds its counts, and warnings about the model.
     [[nodiscard]] sparse_volume draw(const voxelpipe::slabs::layer_range& layers, voxelize_stats& stats);
 
 private:
@@ -39,9 +37,8 @@ private:
     [[nodiscard]] voxelize_request next_step(const voxelpipe::grid& grid);
 
     voxelize_request request_;
-    whole_colors colors_;
     sparse_drawer model_;
-    std::optional<voxelpipe::slabs::slab_exterior> exterior_;
+    slab_passes passes_;
     std::size_t done_ = 0, steps_;
     bool is_first_ = true;
 };

@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <new>
+#include <numeric>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -122,7 +123,10 @@ sparse_volume draw_walls(scene&& model, const voxelize_request& request, const s
     return sparse_drawer(std::move(plain), request).walls(how);
 }
 
-double decided_layer_bytes(const glm::ivec3& extent) { return static_cast<double>(extent.x) * extent.y; }
+double decided_layer_bytes(const voxelize_request& request) {
+    const bool decides = request.solid && (request.solid->vote || request.solid->rule == solid_rule::exterior);
+    return decides ? static_cast<double>(request.grid.extent.x) * request.grid.extent.y : 0;
+}
 
 namespace {
 
@@ -131,13 +135,15 @@ sparse_volume draw_in_slabs(scene&& model, const voxelize_request& request, cons
                             voxelize_stats& stats) {
     constexpr int brick = 8;
     const int layers = request.grid.extent.z;
-    const double fits = static_cast<double>(memory::room()) / 4 / decided_layer_bytes(request.grid.extent);
+    const double fits = static_cast<double>(memory::room()) / 4 / decided_layer_bytes(request);
     const int depth = std::max(1, static_cast<int>(fits) / brick) * brick;
     std::vector<slabs::layer_range> all;
     for (int begin = 0; begin < layers; begin += depth) all.push_back({begin, std::min(layers, begin + depth)});
+    std::vector<std::size_t> numbers(all.size());
+    std::iota(numbers.begin(), numbers.end(), std::size_t{0});
     slab_joiner joined(all.size(), folder);
     {
-        loaded_slabs of_model(std::move(model), request, all, all.size(), folder);
+        loaded_slabs of_model(std::move(model), request, all, numbers, folder, nullptr, stats);
         for (const slabs::layer_range& part : all) joined.add(of_model.draw(part, stats));
     }
     warn_of_parts(stats, request);
@@ -152,12 +158,9 @@ sparse_volume run_sparse_voxelizer(scene&& model, const voxelize_request& reques
                                    voxelize_stats& stats) {
     voxelize_request inside = request;
     inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
-    const bool needs_bits = request.solid && (request.solid->vote || request.solid->rule == solid_rule::exterior);
-    const bool bits_fit =
-        decided_layer_bytes(request.grid.extent) * request.grid.extent.z <= static_cast<double>(memory::room());
+    const bool bits_fit = decided_layer_bytes(request) * request.grid.extent.z <= static_cast<double>(memory::room());
     try {
-        if (needs_bits && !bits_fit && model.triangle_count() != 0)
-            return draw_in_slabs(std::move(model), request, folder, stats);
+        if (!bits_fit && model.triangle_count() != 0) return draw_in_slabs(std::move(model), request, folder, stats);
         return sparse_drawer(std::move(model), request).draw(inside, stats);
     } catch (const std::system_error& error) {
         throw write_error(folder, "temporary files for a flood: " + error.code().message());

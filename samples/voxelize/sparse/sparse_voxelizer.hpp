@@ -68,8 +68,8 @@ private:
                                        const voxelpipe::slabs::layer_range& layers);
 
 // Bytes of a layer of a flood or a vote while it is decided, about: parities along three axes and the cover, or the
-// flood's window; the bits once more as words with their places, four times as large. extent: of the grid.
-[[nodiscard]] double decided_layer_bytes(const glm::ivec3& extent);
+// flood's window; the bits once more as words with their places, four times as large. 0 if the request has neither.
+[[nodiscard]] double decided_layer_bytes(const voxelize_request& request);
 
 // Consumes the scene. A flood or a vote whose bits do not fit into the run's memory is drawn in slabs. folder: for
 // temporary files. Throws as run_voxelizer does, and write_error for a folder that is full.

@@ -7,11 +7,11 @@
 #include "../parallel.hpp"
 #include "../placement.hpp"
 #include "slab_joiner.hpp"
+#include "slab_passes.hpp"
 #include "sparse_voxelizer.hpp"
 #include "streamed_holes.hpp"
-#include "streamed_repairs.hpp"
 #include "streamed_slab.hpp"
-#include "whole_colors.hpp"
+#include "streamed_vote.hpp"
 
 #include <voxelpipe/slabs/bins.hpp>
 #include <voxelpipe/slabs/plan.hpp>
@@ -73,26 +73,21 @@ void warn_of_parts(voxelize_stats& stats, const voxelize_request& request) {
 
 namespace {
 
-// The slabs of a plan, cut at the borders of the ranges; with_gaps: those between the ranges too.
+// The slabs of a plan, cut at the borders of the ranges: those within the ranges that are wanted.
 template <class Varyings>
 std::vector<streamed_slab<Varyings>> slabs_within(const slabs::plan& plan, std::span<const slabs::layer_range> ranges,
-                                                  bool with_gaps) {
+                                                  const std::vector<bool>& wanted) {
     std::vector<streamed_slab<Varyings>> parts;
-    const auto add = [&](const slabs::layer_range& layers, std::size_t range) {
-        for (const slabs::layer_range& s : plan.slabs)
-            if (const int begin = std::max(s.begin, layers.begin), end = std::min(s.end, layers.end); begin < end) {
-                auto& part = parts.emplace_back();
-                part.layers = {begin, end};
-                part.range = range;
-            }
-    };
-    int at = 0;
     for (std::size_t r = 0; r < ranges.size(); ++r) {
-        if (with_gaps) add({at, ranges[r].begin}, streamed_slab<Varyings>::no_range);
-        add(ranges[r], r);
-        at = ranges[r].end;
+        if (!wanted[r]) continue;
+        for (const slabs::layer_range& s : plan.slabs) {
+            const int begin = std::max(s.begin, ranges[r].begin), end = std::min(s.end, ranges[r].end);
+            if (begin >= end) continue;
+            auto& part = parts.emplace_back();
+            part.layers = {begin, end};
+            part.range = r;
+        }
     }
-    if (with_gaps) add({at, plan.slabs.back().end}, streamed_slab<Varyings>::no_range);
     return parts;
 }
 
@@ -104,7 +99,7 @@ void add_time(voxelize_stats& stats, const char* stage, std::chrono::steady_cloc
 // The triangles of each slab.
 template <class Varyings>
 void bin_triangles(triangle_stream& model, const corner_placer& classify, const stream_place& place, double room,
-                   int layers, streamed_repairs& repairs, std::vector<streamed_slab<Varyings>>& parts) {
+                   int layers, streamed_vote& vote, std::vector<streamed_slab<Varyings>>& parts) {
     // The first slab that ends behind a layer.
     std::vector<std::size_t> first_slab(static_cast<std::size_t>(layers) + 1, parts.size());
     for (std::size_t s = parts.size(); s-- > 0;) std::fill_n(first_slab.begin(), parts[s].layers.end, s);
@@ -113,7 +108,7 @@ void bin_triangles(triangle_stream& model, const corner_placer& classify, const 
         slabs::bin_memory<corner_record<Varyings>> spilled(static_cast<std::uint64_t>(room / 8), bins.size(),
                                                            place.folder.string());
         model.for_each_block([&](const triangle_stream::block& block) {
-            repairs.add(block);
+            vote.add(block);
             for (std::size_t i = 0; 3 * i < block.corners.size(); ++i) {
                 const slabs::classified c = classify(block.part, block.corners.data() + 3 * i);
                 if (c.kind != vp::core::triangle_class::drawn) continue;
@@ -133,7 +128,7 @@ void bin_triangles(triangle_stream& model, const corner_placer& classify, const 
 
 template <class Varyings>
 void draw_streamed_as(triangle_stream& model, const stream_place& place, const voxelize_request& request,
-                      std::span<const slabs::layer_range> ranges, voxelize_stats& stats,
+                      const streamed_ranges& ranges, voxelize_stats& stats,
                       const std::function<void(std::size_t, sparse_volume&&)>& sink) {
     const voxelpipe::grid& whole = request.grid;
     const corner_placer classify(request, model);
@@ -152,19 +147,20 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
             if (c.kind == vp::core::triangle_class::drawn) layers.add(c.reach);
         }
     });
-    streamed_repairs repairs(model, request, room, place.folder);
-    whole_colors colors(request);
-    const int passes = (repairs.floods() ? 1 : 0) + colors.num_passes(); // over all slabs, before the first is drawn
-    slabs::plan_options how;
-    how.align = brick;
-    how.layer_cost = static_cast<std::uint64_t>(repairs.layer_bytes() / draw_bytes<Varyings>);
-    const auto most = static_cast<std::uint64_t>(std::max(1.0, room / 4 / draw_bytes<Varyings>));
-    auto parts = slabs_within<Varyings>(slabs::cover(layers, 2, most, how), ranges, passes != 0);
-    place.say(std::to_string(model.num_triangles()) + " triangles do not fit into " + memory::mebibytes(room) +
-              ": they are drawn in " + std::to_string(parts.size()) + " slabs, through temporary files in " +
-              place.folder.string());
-
     try {
+        slab_passes passes(request, ranges.all, ranges.drawn, room, place.folder, ranges.kept);
+        std::vector<bool> is_drawn(ranges.all.size()), is_wanted(ranges.all.size());
+        for (const std::size_t r : ranges.drawn) is_drawn[r] = true;
+        for (std::size_t r = 0; r < is_wanted.size(); ++r) is_wanted[r] = is_drawn[r] || passes.left_of(r) != 0;
+        slabs::plan_options how;
+        how.align = brick;
+        how.layer_cost = static_cast<std::uint64_t>(decided_layer_bytes(request) / draw_bytes<Varyings>);
+        const auto most = static_cast<std::uint64_t>(std::max(1.0, room / 4 / draw_bytes<Varyings>));
+        auto parts = slabs_within<Varyings>(slabs::cover(layers, 2, most, how), ranges.all, is_wanted);
+        place.say(std::to_string(model.num_triangles()) + " triangles do not fit into " + memory::mebibytes(room) +
+                  ": they are drawn in " + std::to_string(parts.size()) + " slabs, through temporary files in " +
+                  place.folder.string());
+
         // Nothing is drawn in the padding.
         const int padding = request.padding;
         const auto drawn_layers = [&](const slabs::layer_range& all) -> slabs::layer_range {
@@ -173,57 +169,53 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
         std::vector<slabs::layer_range> drawn;
         drawn.reserve(parts.size());
         for (const auto& part : parts) drawn.push_back(drawn_layers(part.layers));
-        repairs.begin(drawn);
-        bin_triangles(model, classify, place, room, whole.extent.z, repairs, parts);
+        streamed_vote vote(model, request, drawn);
+        bin_triangles(model, classify, place, room, whole.extent.z, vote, parts);
         add_time(stats, "bin", start);
         stats.triangles_dropped = counts.triangles_dropped();
         stats.triangles_flat = counts.triangles_zero_area;
 
         const streamed_holes holes(model, request, room, place.folder);
 
-        const auto num_drawn = std::count_if(parts.begin(), parts.end(), [](const auto& part) {
-            return part.range != streamed_slab<Varyings>::no_range;
-        });
-        const double all = static_cast<double>(parts.size()) * passes + static_cast<double>(num_drawn);
+        double all = 0;
+        for (const auto& part : parts) all += passes.left_of(part.range) + (is_drawn[part.range] ? 1 : 0);
         double done = 0; // of `all`
         const auto report_part = [&](voxelize_request& part) {
             if (request.progress) part.progress = [&, done](double share) { request.progress((done + share) / all); };
             ++done;
         };
+        const std::uint64_t work_memory =
+            request.work_memory != 0 ? request.work_memory : static_cast<std::uint64_t>(room / 8);
         // The slab without the padding.
         const auto request_of = [&](const slabs::layer_range& layers) {
             const auto [begin, end] = drawn_layers(layers);
             voxelize_request part = request;
             part.grid = whole.crop({padding, padding, begin},
                                    {whole.extent.x - 2 * padding, whole.extent.y - 2 * padding, end - begin});
-            part.work_memory = request.work_memory != 0 ? request.work_memory : static_cast<std::uint64_t>(room / 8);
+            part.work_memory = work_memory;
             report_part(part);
             return part;
         };
-        if (repairs.floods()) {
-            const auto begin = std::chrono::steady_clock::now();
-            for (const auto& part : parts)
-                if (part.triangles.size() != 0) {
-                    voxelize_request walls;
-                    report_part(walls);
-                    repairs.add_walls(scene_of(part, model), part.layers, walls.progress);
-                }
-            repairs.flood();
-            add_time(stats, "flood", begin);
-        }
-        if (colors.num_passes() != 0) {
-            const auto begin = std::chrono::steady_clock::now();
-            for (int pass = 0; pass < colors.num_passes(); ++pass)
-                for (const auto& part : parts)
-                    if (part.triangles.size() != 0 && drawn_layers(part.layers).size() > 0) {
+        passes.run(
+            [&](slab_pass pass, std::size_t range) {
+                for (const auto& part : parts) {
+                    if (part.range != range || part.triangles.size() == 0) continue;
+                    if (pass == slab_pass::walls) {
+                        voxelize_request walls = request;
+                        walls.work_memory = work_memory;
+                        report_part(walls);
+                        passes.add(pass, draw_walls(scene_of(part, model), walls, part.layers));
+                    } else if (drawn_layers(part.layers).size() > 0) {
                         const voxelize_request slab = request_of(part.layers);
                         sparse_drawer of_slab(scene_of(part, model), slab);
-                        colors.add(pass, of_slab, slab);
+                        passes.add(pass, passes.draw(pass, of_slab, slab));
                     }
-            add_time(stats, "colors", begin);
-        }
-        std::erase_if(parts, [](const auto& part) { return part.range == streamed_slab<Varyings>::no_range; });
-        for (std::size_t r = 0, s = 0; r < ranges.size(); ++r) {
+                }
+            },
+            stats);
+        std::erase_if(parts, [&](const auto& part) { return !is_drawn[part.range]; });
+        for (std::size_t i = 0, s = 0; i < ranges.drawn.size(); ++i) {
+            const std::size_t r = ranges.drawn[i];
             const auto num_parts =
                 std::count_if(parts.begin(), parts.end(), [&](const auto& p) { return p.range == r; });
             slab_joiner of_range(static_cast<std::size_t>(num_parts), place.folder);
@@ -231,7 +223,7 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
             for (; s < parts.size() && parts[s].range == r; ++s) {
                 const auto [begin, end] = drawn_layers(parts[s].layers);
                 add_parts(parts[s].parts, holes.parts());
-                if (repairs.floods()) add_parts(parts[s].parts, {0}); // its inside needs no triangle
+                if (passes.floods()) add_parts(parts[s].parts, {0}); // its inside needs no triangle
                 std::vector<std::size_t> numbers;
                 for (const part_count& c : parts[s].parts) numbers.push_back(c.part);
                 scene of_slab = scene_of(parts[s], model);
@@ -245,9 +237,8 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
                     continue;
                 }
                 voxelize_request part = request_of(parts[s].layers);
-                colors.give_to(part);
-                const vp::solid_slab decided = repairs.of(part.grid);
-                if (repairs.is_any()) part.solid->slab = &decided;
+                passes.give_to(part);
+                vote.give_to(part);
                 const std::vector<vp::core::hole_cones> cones = holes.of_bodies(numbers);
                 if (!cones.empty()) part.solid->cones = cones.data();
                 voxelize_stats of_part;
@@ -257,7 +248,7 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
                 add_part(stats, of_part);
                 ++stats.slabs;
             }
-            sink(r, any ? of_range.finish() : empty_bricks(request));
+            sink(i, any ? of_range.finish() : empty_bricks(request));
         }
         holes.count(stats);
         warn_of_parts(stats, request);
@@ -271,7 +262,7 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
 } // namespace
 
 void draw_streamed(triangle_stream& model, const stream_place& place, const voxelize_request& request,
-                   std::span<const slabs::layer_range> ranges, voxelize_stats& stats,
+                   const streamed_ranges& ranges, voxelize_stats& stats,
                    const std::function<void(std::size_t, sparse_volume&&)>& sink) {
     const auto draw = [&]<class Varyings>(Varyings) {
         draw_streamed_as<Varyings>(model, place, request, ranges, stats, sink);
@@ -290,7 +281,8 @@ sparse_volume run_streamed_voxelizer(triangle_stream& model, const stream_place&
                                      voxelize_stats& stats) {
     sparse_volume all;
     const slabs::layer_range layers{0, request.grid.extent.z};
-    draw_streamed(model, place, request, std::span(&layers, 1), stats,
+    const std::size_t number = 0;
+    draw_streamed(model, place, request, {std::span(&layers, 1), std::span(&number, 1), nullptr}, stats,
                   [&](std::size_t, sparse_volume&& bricks) { all = std::move(bricks); });
     if (request.solid && stats.solid)
         if (std::string text = flood_warning(*request.solid, *stats.solid, stats.voxels); !text.empty())

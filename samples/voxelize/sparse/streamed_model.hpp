@@ -7,6 +7,7 @@
 // of a run that holds the model.
 
 #include "../command_line.hpp"
+#include "../pass_files.hpp"
 #include "../triangle_stream.hpp"
 #include "../voxelizer.hpp"
 #include "sparse_volume.hpp"
@@ -33,11 +34,17 @@ struct stream_place {
     std::function<void(const std::string&)> say; // is told once in how many slabs the model is drawn
 };
 
-// Draws layers of the request's grid: ranges that ascend and do not overlap. sink(i, bricks) gets them one after the
-// other. Counts are those of all ranges. Throws as run_voxelizer does, model_error for a file that is damaged, and
-// write_error for a folder that is full.
+// Slabs of the request's grid, as slab_passes has them; `drawn` ascends.
+struct streamed_ranges {
+    std::span<const voxelpipe::slabs::layer_range> all;
+    std::span<const std::size_t> drawn;
+    const pass_files* kept = nullptr;
+};
+
+// sink(i, bricks) gets the slabs drawn[i] one after the other. Counts are those of all of them. Throws as run_voxelizer
+// does, model_error for a file that is damaged, and write_error for a folder that is full.
 void draw_streamed(triangle_stream& model, const stream_place& place, const voxelize_request& request,
-                   std::span<const voxelpipe::slabs::layer_range> ranges, voxelize_stats& stats,
+                   const streamed_ranges& ranges, voxelize_stats& stats,
                    const std::function<void(std::size_t, sparse_volume&&)>& sink);
 
 // The whole grid.

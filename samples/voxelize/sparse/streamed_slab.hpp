@@ -112,7 +112,6 @@ struct part_count {
 // A slab that is drawn at once: layers of one range.
 template <class Varyings>
 struct streamed_slab {
-    static constexpr std::size_t no_range = ~std::size_t{0}; // wanted for what other slabs need of it alone
     slabs::layer_range layers;
     std::size_t range = 0;
     slabs::bin<corner_record<Varyings>> triangles;
