@@ -177,8 +177,8 @@ builder world_of_parts(int side) {
     return file;
 }
 
-constexpr int world_side = 180, world_memory = 52;
-const std::vector<std::string> colors{"-r", "96", "-t", "occupancy,color,material"};
+constexpr int world_side = 120, world_memory = 29;
+const std::vector<std::string> colors{"-r", "128", "-t", "occupancy,color,material"};
 
 TEST(Streamed, GltfOfManyParts) {
     if (sanitized) return;
@@ -188,10 +188,10 @@ TEST(Streamed, GltfOfManyParts) {
     two_ways{
         folder,
         folder / "m.glb",
-        {"-r", "96", "-t", "count,color-replace,triangle", "--scale", "0.25", "--padding", "3", "--coverage", "thin"}}
+        {"-r", "128", "-t", "count,color-replace,triangle", "--scale", "0.25", "--padding", "3", "--coverage", "thin"}}
         .expect_equal(world_memory);
     // A body is a part.
-    two_ways{folder, folder / "m.glb", {"-r", "96", "--solid", "each_draw", "-t", "occupancy,count"}}.expect_equal(
+    two_ways{folder, folder / "m.glb", {"-r", "128", "--solid", "each_draw", "-t", "occupancy,count"}}.expect_equal(
         world_memory);
     // Each with its own lids, which reach slabs that it has no triangle in; parts that mirror turn their corners.
     two_ways{folder, folder / "m.glb", {"-r", "48", "--solid", "each_draw", "--close-holes", "-t", "count"}}
@@ -207,7 +207,7 @@ TEST(Streamed, GltfWithItsBuffersInFiles) {
         .write(reinterpret_cast<const char*>(file.binary.data()), static_cast<std::streamsize>(file.binary.size()));
     file.root["buffers"] = {{{"byteLength", file.binary.size()}, {"uri", "parts/a%20b.bin"}}};
     std::ofstream(folder / "m.gltf") << file.root.dump();
-    const two_ways values{folder, folder / "m.gltf", {"-r", "96", "-t", "occupancy,count,color"}};
+    const two_ways values{folder, folder / "m.gltf", {"-r", "128", "-t", "occupancy,count,color"}};
     values.expect_equal(world_memory);
     // A buffer outside of the folder is refused, as it is by the loader.
     file.root["buffers"][0]["uri"] = "../m.bin";
@@ -250,7 +250,7 @@ void add_textures(builder& file, std::uint32_t side) {
     set(second[0], large, texcoords);
 }
 
-constexpr int textured_memory = 58;
+constexpr int textured_memory = 35;
 
 TEST(Streamed, Textures) {
     if (sanitized) return;
@@ -258,12 +258,12 @@ TEST(Streamed, Textures) {
     builder file = world_of_parts(world_side);
     add_textures(file, 600);
     file.write_glb(folder / "m.glb");
-    two_ways{folder, folder / "m.glb", {"-r", "96", "-t", "occupancy,color,color-max,color-replace,color-outer"}}
+    two_ways{folder, folder / "m.glb", {"-r", "128", "-t", "occupancy,color,color-max,color-replace,color-outer"}}
         .expect_equal(textured_memory);
     // Nobody asks for colours, but the mask cuts fragments off.
-    two_ways{folder, folder / "m.glb", {"-r", "96", "-t", "count,material"}}.expect_equal(world_memory);
+    two_ways{folder, folder / "m.glb", {"-r", "128", "-t", "count,material"}}.expect_equal(world_memory);
     // Another format, dense against slab by slab.
-    const two_ways values{folder, folder / "m.glb", {"-r", "72", "-t", "occupancy,color"}};
+    const two_ways values{folder, folder / "m.glb", {"-r", "128", "-t", "occupancy,color"}};
     const outcome tight = values.draw("tight.vti", {"--max-memory", std::to_string(textured_memory)}),
                   free = values.draw("free.vti", {"--dense"});
     ASSERT_EQ(0, tight.code) << tight.err;
