@@ -122,8 +122,8 @@ public:
     //   exterior      the first call, and one with another `closing`: each GPU draws the cover of its slab, and the
     //                 first one floods, in 2 bits a voxel of the whole grid, 4 with `closing`. Each GPU holds a bit a
     //                 voxel of its slab. If there is no room, the host floods bricks, in device_options::memory and
-    //                 slab_exterior::least_bytes at least, which takes about 1000 times as long, and holds a bit a
-    //                 voxel of the whole grid. A crop is refused, as by one call (crop_without_whole)
+    //                 slab_exterior::least_bytes at least, which takes far longer, and holds a bit a voxel of the
+    //                 whole grid. A crop is refused, as by one call (crop_without_whole)
     // Each call copies its slab's part of what the host holds to its GPU. Throws std::system_error of files.
     template <class SolidShader, class Output>
     [[nodiscard]] status draw_solid(const SolidShader& shader, std::vector<Output>& outputs,
