@@ -95,15 +95,19 @@ void ordered_for(std::size_t count, int threads, const Make& make, const Use& us
         changed.notify_all();
     };
     std::vector<std::jthread> helpers;
-    for (std::size_t n = 1; n < std::min(count, static_cast<std::size_t>(threads)); ++n)
-        helpers.emplace_back([&] {
-            std::unique_lock lock(mutex);
-            while (true) {
-                changed.wait(lock, [&] { return failure || next == count || may_take(); });
-                if (failure || next == count) return;
-                make_one(lock);
-            }
-        });
+    const auto help = [&] {
+        std::unique_lock lock(mutex);
+        while (true) {
+            changed.wait(lock, [&] { return failure || next == count || may_take(); });
+            if (failure || next == count) return;
+            make_one(lock);
+        }
+    };
+    try {
+        for (std::size_t n = 1; n < std::min(count, static_cast<std::size_t>(threads)); ++n) helpers.emplace_back(help);
+    } catch (const std::system_error&) { // as in parallel_for
+    } catch (const std::bad_alloc&) {
+    }
     {
         std::unique_lock lock(mutex);
         while (used < count && !failure) {

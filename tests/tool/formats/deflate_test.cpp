@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Compression in pieces on several threads, and the order that it keeps.
 
+#include "../sanitized.hpp"
 #include "formats/deflate.hpp"
 #include "formats/formats.hpp"
 #include "parallel.hpp"
@@ -9,7 +10,13 @@
 
 #include <zlib.h>
 
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <atomic>
+#include <exception>
+#include <fstream>
 #include <stdexcept>
 
 using namespace voxelize;
@@ -125,6 +132,35 @@ TEST(OrderedFor, UsesResultsInOrderOnTheCallingThread) {
                 });
             EXPECT_EQ(next, count);
         }
+}
+
+// The machine grants some threads or none: address space runs out, of which each stack takes some megabytes.
+TEST(OrderedFor, DoesWithoutThreads) {
+    if (tool_test::sanitized) GTEST_SKIP() << "a sanitizer needs all address space";
+    for (const std::uint64_t room : {2u << 20, 12u << 20, 30u << 20}) {
+        const pid_t child = fork();
+        if (child == 0) {
+            alarm(30); // which ends a process that waits for ever
+            std::ifstream statm("/proc/self/statm");
+            std::uint64_t pages = 0;
+            statm >> pages;
+            const rlim_t most = pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) + room;
+            const rlimit bound{most, most};
+            setrlimit(RLIMIT_AS, &bound);
+            std::size_t next = 0;
+            try {
+                ordered_for(
+                    500, 64, [](std::size_t n) { return n; },
+                    [&](std::size_t n, std::size_t result) { next += n == next && result == n ? 1 : 0; });
+            } catch (const std::exception&) {
+                _exit(2);
+            }
+            _exit(next == 500 ? 0 : 1);
+        }
+        int status = -1;
+        waitpid(child, &status, 0);
+        EXPECT_EQ(status, 0) << room;
+    }
 }
 
 TEST(OrderedFor, ThrowsWhatEitherThrows) {
