@@ -52,12 +52,12 @@ std::vector<std::filesystem::path> write_to(const sparse_volume& voxels, const s
 }
 
 // Writes one output of a dense or sparse volume. Formats that hold every channel get those that were asked for, which
-// come first in the volume; .nvdb takes the colours that --help promises too.
+// come first in the volume; those that need the occupancy take it in any case, and the colours that --help promises.
 template <class Volume>
 std::vector<std::filesystem::path> write_output(Volume& voxels, const command_line& options,
                                                 const std::filesystem::path& output, const write_options& how) {
     std::vector<channel> aside;
-    if (const format* const f = find_format(output); f->all_channels && !f->only_sparse)
+    if (const format* const f = find_format(output); f->all_channels && !f->needs_occupancy)
         while (aside.size() < options.implied.size()) {
             aside.push_back(std::move(voxels.channels.back()));
             voxels.channels.pop_back();
