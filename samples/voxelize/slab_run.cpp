@@ -216,6 +216,8 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
     }
     voxelize_stats all;
     std::vector<fs::path> files = folder.finish(all, outcome.left);
+    if (outcome.left != 0 && options.batch.world_size == 1)
+        throw write_error(folder.path(), "slabs that this run has written are gone");
     if (files.empty()) return outcome;
     outcome.finished = true;
     for (const auto& [name, count] : kept_counts) stats.*count = all.*count;

@@ -156,6 +156,22 @@ TEST(ToolSlabs, AFolderWithoutALockIsRefused) {
     EXPECT_NE(result.err.find("lock: "), std::string::npos) << result.err;
 }
 
+// As if somebody cleared the folder while the run went on.
+TEST(ToolSlabs, SlabsThatAreGoneAreAFailure) {
+    const tower t({"-t", "occupancy,color", "--sparse"}, 1024); // 40 slabs
+    const pid_t child = t.begin("m.zarr", {"--resume"});
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    bool removed = false;
+    while (!removed && std::chrono::steady_clock::now() < end) {
+        for (const fs::path& folder : t.unfinished()) removed = removed || fs::remove(folder / "done.0");
+        std::this_thread::sleep_for(std::chrono::microseconds(200));
+    }
+    const outcome result = wait_for(t.folder, child);
+    EXPECT_EQ(4, result.code) << result.err;
+    EXPECT_NE(result.err.find("are gone"), std::string::npos) << result.err;
+    EXPECT_FALSE(fs::exists(t.folder / "m.zarr"));
+}
+
 // Blocks of levels reach over slabs.
 TEST(ToolSlabs, Levels) {
     const tower t({"-t", "occupancy,color,normal,material", "--levels", "--sparse"});
