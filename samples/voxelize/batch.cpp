@@ -4,6 +4,7 @@
 
 #include "exit_code.hpp"
 #include "memory.hpp"
+#include "model_error.hpp"
 #include "named_files.hpp"
 #include "run_model.hpp"
 
@@ -193,13 +194,16 @@ public:
             for (std::string line; std::getline(file, line);) {
                 const json record = json::parse(line, nullptr, false);
                 if (!record.is_object() || !record.contains("name") || !record.contains("work")) continue;
-                const bool ok = record.value("status", "") == "ok";
-                auto& known = works_[record["name"].get<std::string>()];
-                known = {};
-                if (!ok || !record.contains("outputs")) continue;
-                known.work = record["work"].get<std::string>();
-                for (const json& output : record["outputs"])
-                    known.files.emplace_back(output.value("file", ""), output.value("bytes", std::uint64_t{0}));
+                try {
+                    known_model read;
+                    if (record.value("status", "") == "ok" && record.contains("outputs")) {
+                        read.work = record["work"].get<std::string>();
+                        for (const json& output : record["outputs"])
+                            read.files.emplace_back(output.value("file", ""), output.value("bytes", std::uint64_t{0}));
+                    }
+                    works_[record["name"].get<std::string>()] = std::move(read);
+                } catch (const json::exception&) { // a line that this program has not written
+                }
             }
         }
     }
@@ -358,7 +362,7 @@ int run_batch(const command_line& options) {
         std::ifstream list(options.batch.list);
         models = read_list(list);
         if (list.bad() || (!list.is_open()))
-            throw std::runtime_error("cannot read the list '" + options.batch.list.string() + "'");
+            throw model_error("cannot read the list '" + options.batch.list.string() + "'");
     }
     const fs::path folder = manifest_folder(options.outputs.front());
     const manifest records(folder / ("manifest." + std::to_string(options.batch.rank) + ".jsonl"));

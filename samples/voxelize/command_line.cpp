@@ -114,7 +114,7 @@ command_line parse_command_line(int argc, const char* const* argv) {
     }
     if (options.storage != storage_choice::automatic)
         options.arguments.emplace_back(options.storage == storage_choice::sparse ? "--sparse" : "--dense");
-    understand_batch(options, app.count("--world-size") != 0);
+    understand_batch(options, app.count("--world-size") != 0, app.count("--rank") != 0);
     understand_solid(options, raw);
     understand_grid(options, raw);
     understand_outputs(options, raw);

@@ -5,9 +5,11 @@
 #include "command_line.hpp"
 #include "exit_code.hpp"
 #include "memory.hpp"
+#include "model_error.hpp"
 #include "run_model.hpp"
 
 #include <chrono>
+#include <csignal>
 #include <iostream>
 
 namespace voxelize {
@@ -54,6 +56,8 @@ int run_main(int argc, char** argv) {
     if (!options.batch.list.empty()) {
         try {
             return run_batch(options);
+        } catch (const model_error& error) {
+            return fail(exit_input, error.what());
         } catch (const std::exception& error) {
             return fail(exit_output, error.what());
         }
@@ -71,4 +75,7 @@ int run_main(int argc, char** argv) {
 } // namespace
 } // namespace voxelize
 
-int main(int argc, char** argv) { return voxelize::run_main(argc, argv); }
+int main(int argc, char** argv) {
+    std::signal(SIGXFSZ, SIG_IGN); // a file beyond the limit of the shell fails like one on a full disk
+    return voxelize::run_main(argc, argv);
+}

@@ -97,6 +97,23 @@ TEST(ToolBatch, EachModelIsWhatARunByItselfGives) {
     EXPECT_NE(all.run_list({"--coverage", "thin"}).out.find("1 done, 6 were finished"), std::string::npos);
 }
 
+TEST(ToolBatch, ForeignLinesOfAManifestArePassedOver) {
+    models all;
+    all.add("p.obj");
+    all.write_list();
+    fs::create_directories(all.folder / "out");
+    std::ofstream(all.folder / "out/manifest.other.jsonl")
+        << "{\"name\": 3, \"work\": \"x\", \"status\": \"ok\", \"outputs\": []}\n"
+        << "{\"name\": \"p\", \"work\": 5, \"status\": \"ok\", \"outputs\": []}\n"
+        << "{\"name\": \"p\", \"work\": \"x\", \"status\": 7}\n"
+        << "{\"name\": \"p\", \"work\": \"x\", \"status\": \"ok\", \"outputs\": [3]}\n"
+        << "{\"name\": \"p\", \"work\": \"x\", \"status\": \"ok\", \"outputs\": [{\"file\": 3}]}\n[1]\nnull\n";
+    const outcome first = all.run_list();
+    EXPECT_EQ(first.code, 0) << first.err;
+    EXPECT_NE(first.out.find("1 done, 0 were finished"), std::string::npos) << first.out;
+    EXPECT_NE(all.run_list().out.find("0 done, 1 were finished"), std::string::npos);
+}
+
 TEST(ToolBatch, RanksShareTheList) {
     models all;
     for (int i = 0; i < 5; ++i) all.add("p" + std::to_string(i) + ".obj");
@@ -200,6 +217,10 @@ TEST(ToolBatch, ChecksItsOptions) {
     EXPECT_NE(error({"--list", "l", "-o", "{name}.zarr", "--resume"}).find("for one model"), std::string::npos);
     EXPECT_NE(error({"--list", "l", "-o", "{name}.npy", "--rank", "2", "--world-size", "2"}).find("below --world-size"),
               std::string::npos);
+    EXPECT_NE(error({"--list", "l", "-o", "{name}.npy", "--world-size", "2"}).find("--world-size needs --rank"),
+              std::string::npos);
+    EXPECT_NE(error({"m.obj", "-o", "m.zarr", "--world-size", "2"}).find("--world-size needs --rank"),
+              std::string::npos);
     EXPECT_NE(error({"m.obj", "-o", "x.npy", "--jobs", "2"}).find("--list"), std::string::npos);
     ::setenv("PMI_SIZE", "2", 1); // as under mpiexec
     EXPECT_NE(error({"m.obj", "-o", "x.npy"})
@@ -208,7 +229,7 @@ TEST(ToolBatch, ChecksItsOptions) {
               std::string::npos);
     ::unsetenv("PMI_SIZE");
     const outcome missing = run(folder, {"--list", folder / "none.txt", "-o", folder / "{name}.npy"});
-    EXPECT_EQ(missing.code, 4);
+    EXPECT_EQ(missing.code, 2);
     EXPECT_NE(missing.err.find("cannot read the list"), std::string::npos);
 }
 

@@ -111,6 +111,21 @@ TEST(Tool, OtherFailuresHaveTheirOwnCodes) {
     EXPECT_NE(std::string::npos, large.err.find("MiB")) << large.err;
 }
 
+TEST(Tool, AFileBeyondTheLimitOfTheShellLeavesNothing) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    rlimit before{};
+    ASSERT_EQ(0, getrlimit(RLIMIT_FSIZE, &before));
+    const rlimit bound{8192, before.rlim_max}; // as `ulimit -f`, which the program inherits
+    ASSERT_EQ(0, setrlimit(RLIMIT_FSIZE, &bound));
+    const outcome result = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-r", "64"});
+    setrlimit(RLIMIT_FSIZE, &before);
+    EXPECT_EQ(4, result.code) << result.err;
+    EXPECT_NE(std::string::npos, result.err.find("o.npy")) << result.err;
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
+        EXPECT_EQ(std::string::npos, entry.path().filename().string().find("o.npy")) << entry.path();
+}
+
 // Three squares in one layer: red below green below a blue that is half transparent.
 TEST(Tool, ColorsMeetAsTheirTargetSays) {
     const scratch_folder folder;
@@ -374,6 +389,19 @@ TEST(Tool, EveryFormatTakesEveryTarget) {
         const bool is_folder = std::filesystem::is_directory(first);
         EXPECT_LT(0U, std::filesystem::file_size(is_folder ? first + "/zarr.json" : first)) << first;
     }
+}
+
+// One that the format does not show by itself, too: what it needs beside it is computed.
+TEST(Tool, EveryFormatTakesOneTarget) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    for (const voxelize::format& entry : voxelize::formats())
+        for (const std::string& storage : {"--dense", "--sparse"}) {
+            const std::string out = folder / std::string("o").append(entry.extension);
+            const outcome result = run(folder, {folder / "m.glb", "-q", "-o", out, "-r", "20", "-t", "count", storage,
+                                                "--image-size", "64x48"});
+            EXPECT_EQ(0, result.code) << entry.extension << ": " << result.err;
+        }
 }
 
 } // namespace

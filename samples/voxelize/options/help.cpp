@@ -73,7 +73,7 @@ std::string help_footer() {
         "was\n"
         "  stopped.\n"
         "\nEXIT CODES\n"
-        "  0 done   1 wrong command line   2 the model cannot be used   3 not enough memory\n"
+        "  0 done   1 wrong command line   2 the model, or the list, cannot be used   3 not enough memory\n"
         "  4 an output cannot be written   5 --backend cuda cannot be used   70 a bug of this program\n"
         "  5 is: built without CUDA, no driver, a driver too old, no GPU, or one that there is no code for; too\n"
         "  little memory on the GPU is 3, as on the machine. With --backend auto the CPU does the work instead.\n";

@@ -36,7 +36,8 @@ struct raw_options {
 void describe(CLI::App& app, command_line& options, raw_options& raw);
 
 // Sets the options of lists and of ranks. HAS_WORLD: --world-size was given; otherwise mpiexec or srun may say it.
-void understand_batch(command_line& options, bool has_world);
+// HAS_RANK: --rank was given.
+void understand_batch(command_line& options, bool has_world, bool has_rank);
 // Fills OPTIONS from RAW, in this order. They throw usage_error.
 void understand_solid(command_line& options, const raw_options& raw);
 void understand_grid(command_line& options, const raw_options& raw);

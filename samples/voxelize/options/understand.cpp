@@ -34,10 +34,13 @@ std::optional<int> from_environment(std::initializer_list<const char*> names) {
 
 } // namespace
 
-void understand_batch(command_line& options, bool has_world) {
+void understand_batch(command_line& options, bool has_world, bool has_rank) {
     batch_request& batch = options.batch;
     if (batch.list.empty() && options.input.empty()) throw usage_error("INPUT is required: voxelize INPUT -o FILE");
     if (options.outputs.empty()) throw usage_error("--output is required: voxelize INPUT -o FILE");
+    if (batch.world_size > 1 && !has_rank)
+        throw usage_error("--world-size needs --rank: which of the " + std::to_string(batch.world_size) +
+                          " processes this one is");
     const auto check_rank = [&] {
         if (batch.rank >= batch.world_size)
             throw usage_error("--rank is below --world-size: " + std::to_string(batch.rank) + " of " +
