@@ -370,6 +370,8 @@ TEST(Tool, ColourIsTheDefaultWhereItShows) {
     EXPECT_EQ(json({"occupancy"}), targets({"-o", folder / "a.npy"}));
     EXPECT_EQ(json({"occupancy", "color"}), targets({"-o", folder / "a.png"}));
     EXPECT_EQ(json({"occupancy", "color"}), targets({"-o", folder / "a.vox", "-o", folder / "a.npz"}));
+    EXPECT_EQ(json({"occupancy", "color"}), targets({"-o", folder / "a.html"}));
+    EXPECT_NE(std::string::npos, read_file(folder / "a.html").find("\"name\":\"color\"")); // and the page has them
     EXPECT_EQ(json({"occupancy"}), targets({"-o", folder / "a.png", "--no-color"}));
     EXPECT_EQ(json({"count", "occupancy"}), targets({"-o", folder / "a.binvox", "-t", "count"}));
     EXPECT_EQ(json({"count", "depth"}), targets({"-o", folder / "a.vti", "-t", "count", "-t", "depth", "-t", "count"}));
