@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "batch.hpp"
 
+#include "batch_manifest.hpp"
 #include "exit_code.hpp"
 #include "memory.hpp"
 #include "model_error.hpp"
@@ -153,78 +154,6 @@ json record_of(const listed_model& model, const std::string& work) {
     _exit(result.code);
 }
 
-// Lines are appended whole, each with one write: a run that is killed leaves at most one unfinished line.
-class manifest {
-public:
-    explicit manifest(const fs::path& path) : path_(path) {
-        if (path.has_parent_path()) fs::create_directories(path.parent_path());
-        file_ = open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-        if (file_ < 0) fail("open");
-        char last = '\n';
-        const off_t size = lseek(file_, 0, SEEK_END);
-        if (size > 0 && pread(file_, &last, 1, size - 1) == 1 && last != '\n') add_text("\n");
-    }
-    manifest(const manifest&) = delete;
-    manifest& operator=(const manifest&) = delete;
-    ~manifest() { close(file_); }
-    void add(const std::string& line) const { add_text(line + '\n'); }
-
-private:
-    void add_text(const std::string& text) const {
-        if (::write(file_, text.data(), text.size()) != static_cast<ssize_t>(text.size())) fail("write");
-    }
-    [[noreturn]] void fail(const char* action) const {
-        throw std::runtime_error("cannot " + std::string(action) + " '" + path_.string() +
-                                 "': " + std::strerror(errno));
-    }
-    fs::path path_;
-    int file_ = -1;
-};
-
-// The latest record of each name in the manifests of all ranks, if it says ok and its files are there.
-class finished_models {
-public:
-    explicit finished_models(const fs::path& folder) {
-        std::error_code error;
-        for (const fs::directory_entry& entry :
-             fs::directory_iterator(folder.empty() ? fs::path(".") : folder, error)) {
-            const std::string name = entry.path().filename().string();
-            if (!name.starts_with("manifest.") || !name.ends_with(".jsonl")) continue;
-            std::ifstream file(entry.path());
-            for (std::string line; std::getline(file, line);) {
-                const json record = json::parse(line, nullptr, false);
-                if (!record.is_object() || !record.contains("name") || !record.contains("work")) continue;
-                try {
-                    known_model read;
-                    if (record.value("status", "") == "ok" && record.contains("outputs")) {
-                        read.work = record["work"].get<std::string>();
-                        for (const json& output : record["outputs"])
-                            read.files.emplace_back(output.value("file", ""), output.value("bytes", std::uint64_t{0}));
-                    }
-                    works_[record["name"].get<std::string>()] = std::move(read);
-                } catch (const json::exception&) { // a line that this program has not written
-                }
-            }
-        }
-    }
-    [[nodiscard]] bool has(const std::string& name, const std::string& work) const {
-        const auto found = works_.find(name);
-        if (found == works_.end() || found->second.work != work || found->second.files.empty()) return false;
-        return std::all_of(found->second.files.begin(), found->second.files.end(), [](const auto& file) {
-            std::error_code error;
-            if (fs::is_directory(file.first, error)) return true;
-            return fs::file_size(file.first, error) == file.second && !error;
-        });
-    }
-
-private:
-    struct known_model {
-        std::string work;
-        std::vector<std::pair<std::string, std::uint64_t>> files;
-    };
-    std::unordered_map<std::string, known_model> works_;
-};
-
 // The processes of models.
 class workers {
 public:
@@ -372,7 +301,7 @@ int run_batch(const command_line& options) {
     workers running;
     const auto wait = [&] {
         running.wait([&](const workers::job& job, const json& record) {
-            records.add(record.dump(-1, ' ', false, json::error_handler_t::replace));
+            records.add(record);
             const std::string status = record.value("status", "");
             ++done;
             if (status != "ok") {
@@ -390,7 +319,7 @@ int run_batch(const command_line& options) {
             continue;
         ++mine;
         std::string work = work_of(options, models[i].input);
-        if (finished.has(models[i].name, work)) {
+        if (finished.has(models[i], work)) {
             ++skipped;
             continue;
         }

@@ -4,6 +4,9 @@
 
 #include "formats/output_file.hpp"
 
+#include <array>
+#include <cstddef>
+#include <span>
 #include <system_error>
 #include <utility>
 
@@ -33,7 +36,8 @@ void scratch_bytes::read(std::uint64_t offset, std::span<char> bytes) {
 }
 
 void scratch_bytes::flush() {
-    file_.write(file_.extend(pending_.size()), {pending_});
+    const std::array<std::span<const std::byte>, 1> parts{pending_};
+    file_.write(file_.extend(pending_.size()), parts);
     named([&] { file_.check(); });
     pending_.clear();
 }

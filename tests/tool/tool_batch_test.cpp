@@ -133,6 +133,50 @@ TEST(ToolBatch, RanksShareTheList) {
     EXPECT_NE(all.run_list().out.find("0 done, 6 were finished"), std::string::npos);
 }
 
+// Two ranks have made the same outputs, by different options: the files are those of the later one.
+TEST(ToolBatch, TheLatestRecordOfAllRanksCounts) {
+    for (const bool first_is_0 : {true, false}) {
+        SCOPED_TRACE(first_is_0);
+        models all;
+        all.add("p.obj");
+        std::ofstream(all.inputs[0]) << "v 0 0 0\nv 1 0.3 0.2\nv 0.2 1 0.6\nf 1 2 3\n"; // slanted
+        const std::string ranks[] = {first_is_0 ? "0" : "1", first_is_0 ? "1" : "0"};
+        const std::vector<std::string> thin{"--coverage", "thin"};
+        const auto as = [&](const std::string& rank, std::vector<std::string> more) {
+            // Of a list of two, rank 1 has the second.
+            std::ofstream(all.folder / "models.txt") << (rank == "1" ? "other.obj\n" : "") << all.inputs[0] << '\n';
+            more.insert(more.end(), {"--rank", rank, "--world-size", "2"});
+            return all.run_list(more).out;
+        };
+        EXPECT_NE(as(ranks[0], {}).find("1 done, 0 were finished"), std::string::npos);
+        const std::string conservative = read_file(all.folder / "out/p.npy");
+        EXPECT_NE(as(ranks[1], thin).find("1 done, 0 were finished"), std::string::npos);
+        EXPECT_TRUE(read_file(all.folder / "out/p.npy") != conservative);
+        EXPECT_NE(as(ranks[1], thin).find("0 done, 1 were finished"), std::string::npos);
+        EXPECT_NE(as(ranks[0], {}).find("1 done, 0 were finished"), std::string::npos);
+        EXPECT_TRUE(read_file(all.folder / "out/p.npy") == conservative);
+        EXPECT_NE(as(ranks[1], thin).find("1 done, 0 were finished"), std::string::npos);
+    }
+}
+
+// Models of equal names, sizes and times that swap their places in the list, and so their outputs.
+TEST(ToolBatch, AModelIsKnownByItsPath) {
+    models all;
+    all.add("a/p.obj", 2);
+    all.add("b/p.obj", 4);
+    const auto time = fs::last_write_time(all.inputs[0]);
+    fs::last_write_time(all.inputs[1], time);
+    ASSERT_EQ(fs::file_size(all.inputs[0]), fs::file_size(all.inputs[1]));
+    all.write_list();
+    EXPECT_NE(all.run_list().out.find("2 done, 0 were finished"), std::string::npos);
+    EXPECT_NE(all.run_list().out.find("0 done, 2 were finished"), std::string::npos);
+    const std::string second = read_file(all.folder / "out/p-2.npy");
+    std::swap(all.inputs[0], all.inputs[1]);
+    all.write_list();
+    EXPECT_NE(all.run_list().out.find("2 done, 0 were finished"), std::string::npos);
+    EXPECT_TRUE(read_file(all.folder / "out/p.npy") == second);
+}
+
 TEST(ToolBatch, ABadModelStopsNothing) {
     models all;
     all.add("good1.obj");

@@ -20,6 +20,7 @@
 #include <iterator>
 #include <memory>
 #include <mutex>
+#include <new>
 #include <span>
 #include <string>
 #include <system_error>
@@ -50,9 +51,11 @@ public:
         coming_.fetch_add(1);
         return std::exchange(size_, size_ + bytes);
     }
-    // Fills room that extend() gave, with its bytes. By any thread; never throws, readers do.
-    void write(std::uint64_t offset, const std::vector<std::span<const std::byte>>& parts) noexcept {
-        for (std::span<const std::byte> bytes : parts)
+    // Fills room that extend() gave, with the bytes of arrays. By any thread; never throws, readers do.
+    template <class Parts>
+    void write(std::uint64_t offset, const Parts& parts) noexcept {
+        for (const auto& part : parts) {
+            auto bytes = std::as_bytes(std::span<const typename Parts::value_type::value_type>(part));
             while (!bytes.empty()) {
                 const ssize_t n = ::pwrite(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
                 if (n < 0 && errno == EINTR) continue;
@@ -61,6 +64,7 @@ public:
                 offset += static_cast<std::uint64_t>(n);
                 bytes = bytes.subspan(static_cast<std::size_t>(n));
             }
+        }
         coming_.fetch_sub(1);
         coming_.notify_all();
     }
@@ -99,11 +103,7 @@ struct spilled_records {
     std::vector<std::vector<Record>> blocks; // in order
 
     // To the file; see scratch_file::write.
-    void write() const noexcept {
-        std::vector<std::span<const std::byte>> parts;
-        for (const auto& b : blocks) parts.push_back(std::as_bytes(std::span<const Record>(b)));
-        file->write(offset, parts);
-    }
+    void write() const noexcept { file->write(offset, blocks); }
 };
 
 // Records in the order in which they came. Those in a file precede those in memory.
@@ -267,12 +267,19 @@ private:
             try {
                 writers_.emplace_back([this] { serve(); });
             } catch (const std::system_error&) {
+            } catch (const std::bad_alloc&) {
             }
         }
         if (writers_.empty()) return records.write(); // the machine grants no thread
         std::unique_lock lock(mutex_);
+        try {
+            queue_.emplace_back();
+        } catch (const std::bad_alloc&) { // readers wait for what has room in the file
+            lock.unlock();
+            return records.write();
+        }
         on_their_way_ += records.memory;
-        queue_.push_back(std::move(records));
+        queue_.back() = std::move(records);
         comes_.notify_one();
         goes_.wait(lock, [&] { return held_ + on_their_way_ <= budget_ || on_their_way_ == 0; });
     }

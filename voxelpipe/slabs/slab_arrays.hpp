@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <new>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -31,7 +32,7 @@ struct slab_arrays {
     slab_arrays() = default;
     // Reads the bin by threads. Throws std::bad_alloc, and std::system_error of its file.
     slab_arrays(const bin<record<Varyings>>& from, unsigned threads)
-        : positions(3 * static_cast<std::size_t>(from.size())), triangles(static_cast<std::size_t>(from.size())),
+        : positions(3 * numbered(from.size())), triangles(static_cast<std::size_t>(from.size())),
           numbers(static_cast<std::size_t>(from.size())),
           varyings(std::is_empty_v<Varyings> ? 0 : 3 * static_cast<std::size_t>(from.size())) {
         constexpr std::size_t block = 32768;
@@ -65,6 +66,11 @@ struct slab_arrays {
     }
 
 private:
+    // So many triangles; not more than whose vertices can be numbered.
+    [[nodiscard]] static std::size_t numbered(std::uint64_t count) {
+        if (count > std::numeric_limits<std::uint32_t>::max() / 3) throw std::bad_alloc();
+        return static_cast<std::size_t>(count);
+    }
     void put(std::size_t i, const record<Varyings>& r) {
         for (std::size_t k = 0; k < 3; ++k) {
             positions[3 * i + k] = r.positions[k];

@@ -177,7 +177,11 @@ void replace_zarr(const fs::path& folder, const fs::path& target) {
         if (error) fail_rename(target, error);
     }
     fs::rename(folder, target, error);
-    if (error) fail_rename(target, error);
+    if (error) {
+        std::error_code ignored;
+        if (!old.empty()) fs::rename(old, target, ignored);
+        fail_rename(target, error);
+    }
     if (!old.empty()) fs::remove_all(old, error);
 }
 
