@@ -398,7 +398,7 @@ TEST(Tool, EveryFormatTakesOneTarget) {
     const scratch_folder folder;
     gltf_test::small_world().write_glb(folder / "m.glb");
     for (const voxelize::format& entry : voxelize::formats())
-        for (const std::string& storage : {"--dense", "--sparse"}) {
+        for (const char* storage : {"--dense", "--sparse"}) {
             const std::string out = folder / std::string("o").append(entry.extension);
             const outcome result = run(folder, {folder / "m.glb", "-q", "-o", out, "-r", "20", "-t", "count", storage,
                                                 "--image-size", "64x48"});
