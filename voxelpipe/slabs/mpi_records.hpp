@@ -69,7 +69,8 @@ void exchange_records(const ranks& all, const plan& slabs, std::uint32_t base, b
                 const layer_range reach = reach_of(r);
                 const std::uint32_t last = rank_of[static_cast<std::size_t>(reach.end - 1)];
                 for (std::uint32_t to = rank_of[static_cast<std::size_t>(reach.begin)]; to <= last; ++to) {
-                    out.elements[static_cast<std::size_t>(out.firsts[to] + out.counts[to]++)] = r;
+                    out.elements[static_cast<std::size_t>(out.firsts[to]) +
+                                 static_cast<std::size_t>(out.counts[to]++)] = r;
                     is_full |= static_cast<std::uint64_t>(out.counts[to]) == most;
                 }
             }
@@ -78,7 +79,8 @@ void exchange_records(const ranks& all, const plan& slabs, std::uint32_t base, b
         work([&] {
             for (std::size_t from = 0; from < all.size(); ++from)
                 for (int i = 0; i < in.counts[from]; ++i)
-                    held->push(received, from, in.elements[static_cast<std::size_t>(in.firsts[from] + i)]);
+                    held->push(received, from,
+                               in.elements[static_cast<std::size_t>(in.firsts[from]) + static_cast<std::size_t>(i)]);
         });
         goes_on = all.any(at != read.size() || have_read != total);
     }
