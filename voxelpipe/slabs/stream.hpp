@@ -246,7 +246,8 @@ private:
                 }
                 if (part.drawn.ok()) {
                     add_drawn(all, part.drawn);
-                    if (!sink(std::as_const(part), out)) return core::failure(status_code::other_rank_failed);
+                    if (!sink(std::as_const(part), out)) // any failure ends the loop; with_sink throws
+                        return core::failure(status_code::device_error);
                     if constexpr (IsSolid) repairs_.leave();
                 }
                 return part.drawn;
