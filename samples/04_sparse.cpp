@@ -5,8 +5,8 @@
 #include "picture.hpp"
 
 #include <cpu_ref/backend.hpp>
-#include <voxelpipe/backend_octree.hpp>
-#include <voxelpipe/io/nanovdb.hpp>
+#include <voxelpipe/sparse/backend_octree.hpp>
+#include <voxelpipe/sparse/io/nanovdb.hpp>
 
 #include <cmath>
 #include <cstdio>

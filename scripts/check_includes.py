@@ -3,11 +3,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks the direction of the library's includes. Prints each include that breaks a rule; the exit status is 1 if any does.
 
+The library's parts, from the top down; an include names a file of the same part or of a part further down:
+
+    slabs
+    programs
+    sparse
+    solid
+    levels
+    voxelize.hpp and the other headers directly in voxelpipe/ (but voxelpipe.hpp, which includes all), and device/
+    core, tuning
+
+Each module (slabs to levels) has its kernels in its own device/. core/ includes core/, tuning/ and config.hpp only.
 Inside voxelpipe/device/ an include names a file of the same folder or of a folder further down:
 
-    optional            (compiled by programs that call it only: solids, sparse framebuffers)
-    device/ itself      (backend, voxelize_async, abuffer_async)
-    solid, sparse
+    device/ itself      (backend, surface_calls, voxelize_async, abuffer_async)
     call
     tiles, fragments    (neither includes the other)
     raster
@@ -15,44 +24,67 @@ Inside voxelpipe/device/ an include names a file of the same folder or of a fold
     scene
     base
 
-core/ includes core/, tuning/ and config.hpp only: no header of the API, nothing of device/. tuning/ includes core/ and tuning/
-only. programs/, octree/ and sparse/ hold the passes behind the API's headers and count as these. cpu_ref/ includes nothing of
-device/, and of the API headers only voxelpipe.hpp includes device/. No include cycle anywhere. At most four files lie directly
-in device/.
+Outside a device/ folder only voxelpipe.hpp and .cuh files include one. cpu_ref/ mirrors the modules: cpu_ref/solid and
+cpu_ref/sparse stand above its other files, and cpu_ref/backend.hpp includes all. It includes no device/. No include cycle
+anywhere. At most four files lie directly in device/. Forwarding headers are left out.
 
-    scripts/check_includes.py [ROOT]
+    scripts/check_includes.py [--depth N] [ROOT]
+
+--depth N: also fails if a chain of includes that begins at voxelpipe.hpp has more than N files, and prints the longest.
 """
+import argparse
 import pathlib
 import re
 import sys
 
-LAYERS = ["optional", "", "solid sparse", "call", "tiles fragments", "raster", "targets", "scene", "base"]  # of device/, from the top down
+LAYERS = ["", "call", "tiles fragments", "raster", "targets", "scene", "base"]  # of device/, from the top down
+MODULES = ["slabs", "programs", "sparse", "solid", "levels", "api", "core"]  # of voxelpipe/, from the top down
 MAX_LOOSE = 4  # files directly in device/: what a reader meets first
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in (folders.split() or [""])}
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)
+UMBRELLAS = ("voxelpipe/voxelpipe.hpp", "cpu_ref/backend.hpp")
 
 
 def place(name):
-    """(part, folder): part is device, core, tuning, api, io or cpu_ref; folder is that within device/."""
+    """(part, folder): part is device, core, tuning, api, cpu_ref or a module; folder is that within the part."""
+    if name == "voxelpipe/config.hpp":
+        return "core", ""
     parts = name.split("/")
     if parts[0] == "cpu_ref":
-        return "cpu_ref", ""
+        return "cpu_ref", parts[1] if len(parts) > 2 else ""
     part = parts[1] if len(parts) > 2 else "api"
-    return part, parts[2] if part == "device" and len(parts) > 3 else ""
+    return part, "/".join(parts[2:-1])
+
+
+def module(part):
+    return {"device": "api", "tuning": "core", "cuda_kernels": "api"}.get(part, part)
 
 
 def complaint(source, target):
     """Why `source` may not include `target`, or None. Cycles are found apart."""
     part, folder = place(source)
     to_part, to_folder = place(target)
-    if part == "core" and to_part not in ("core", "tuning") and target != "voxelpipe/config.hpp":
-        return f"core/ may not include {to_part}"
-    if part == "tuning" and to_part not in ("core", "tuning") and target != "voxelpipe/config.hpp":
-        return f"tuning/ may not include {to_part}"
-    if to_part == "device" and part != "device" and source != "voxelpipe/voxelpipe.hpp":
-        return f"{part} may not include device/"
-    if to_part == "cpu_ref" and part != "cpu_ref":
+    if source in UMBRELLAS or part == "slabs" and target in UMBRELLAS:
+        return None
+    if target in UMBRELLAS:
+        return "that header is for programs"
+    if part in ("core", "tuning") and to_part not in ("core", "tuning"):
+        return f"{part}/ may not include {to_part}"
+    to_device = to_part == "device" or to_folder.split("/")[0] == "device"
+    if to_device and (part == "cpu_ref" or source.endswith(".hpp") and "device" not in (part, folder)):
+        return f"{source} may not include a device/ folder"
+    if part == "cpu_ref":
+        order = ["sparse", "solid", ""]
+        if to_part == "cpu_ref" and order.index(to_folder) < order.index(folder):
+            return f"cpu_ref/{folder} may not include cpu_ref/{to_folder}: includes run downward"
+        return None
+    if to_part == "cpu_ref":
         return f"{part} may not include cpu_ref/"
+    for name in (part, to_part):
+        if module(name) not in MODULES:
+            return f"{name}/ is no module: name it in scripts/check_includes.py"
+    if MODULES.index(module(to_part)) < MODULES.index(module(part)):
+        return f"{part} may not include {to_part}: includes run downward"
     if part == "device" and to_part == "device" and folder != to_folder:
         if folder not in LEVEL:
             return f"device/{folder}/ is no layer: name it in scripts/check_includes.py"
@@ -85,9 +117,22 @@ def find_cycle(includes):
     return None
 
 
+def longest_chain(includes, name, known):
+    """The longest chain of includes that begins at `name`; there are no cycles."""
+    if name not in known:
+        chains = [longest_chain(includes, target, known) for target in includes[name]]
+        known[name] = [name] + max(chains, key=len, default=[])
+    return known[name]
+
+
 def main():
-    root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__).parent.parent)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--depth", type=int, metavar="N")
+    parser.add_argument("root", nargs="?", type=pathlib.Path, default=pathlib.Path(__file__).parent.parent)
+    arguments = parser.parse_args()
+    root = arguments.root
     files = [f for folder in ("voxelpipe", "cpu_ref") for f in sorted((root / folder).rglob("*")) if f.suffix in (".hpp", ".cuh")]
+    files = [f for f in files if "// forwarding header" not in f.read_text()]
     names = {f.relative_to(root).as_posix(): f for f in files}
     includes, failed = {}, False
     for name, file in names.items():
@@ -107,6 +152,11 @@ def main():
     loose = [name for name in names if name.startswith("voxelpipe/device/") and name.count("/") == 2]
     if len(loose) > MAX_LOOSE:
         print(f"{len(loose)} files lie directly in device/, more than {MAX_LOOSE}: " + ", ".join(loose))
+    if arguments.depth and files and not cycle:
+        chain = longest_chain(includes, UMBRELLAS[0], {})
+        if len(chain) > arguments.depth:
+            print(f"a chain of {len(chain)} includes, more than {arguments.depth}: " + " -> ".join(chain))
+            failed = True
     sys.exit(failed or bool(cycle) or not files or len(loose) > MAX_LOOSE)
 
 

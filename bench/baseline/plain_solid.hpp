@@ -8,9 +8,9 @@
 
 #include "mesh_data.hpp"
 
-#include <voxelpipe/core/crossing.hpp>
 #include <voxelpipe/core/layout.hpp>
 #include <voxelpipe/grid.hpp>
+#include <voxelpipe/solid/core/crossing.hpp>
 
 #include <algorithm>
 #include <cstdint>

@@ -8,7 +8,7 @@
 #include "session.hpp"
 #include "timer.hpp"
 
-#include <voxelpipe/backend_octree_dag.hpp>
+#include <voxelpipe/sparse/backend_octree_dag.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <cstring>

@@ -14,7 +14,7 @@
 #include "scene_choice.hpp"
 #include "table.hpp"
 
-#include <voxelpipe/device/optional/solid_async.cuh>
+#include <voxelpipe/solid/device/solid_async.cuh>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <cstdio>

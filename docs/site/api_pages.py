@@ -22,24 +22,24 @@ CPP = {
                      "In the paper: frame-buffer types, multiple render targets, blending modes, programmable ROP.",
                      ["framebuffer.hpp", "blend.hpp", "core/layout.hpp", "core/value_traits.hpp", "core/half.hpp", "host_target.hpp"]),
     "abuffers": ("A-buffers", "Every fragment of every voxel. In the paper: A-buffer and bucketing.", ["abuffer.hpp"]),
-    "solids": ("Solids", "The inside of meshes.", ["solid.hpp", "core/crossing.hpp"]),
+    "solids": ("Solids", "The inside of meshes.", ["solid.hpp", "solid/core/crossing.hpp"]),
     "sparse": ("Sparse grids", "Memory in proportion to the voxels that are drawn: bricks, octrees, files.",
-               ["sparse.hpp", "host_sparse.hpp", "sparse_merge.hpp", "core/brick_table.hpp", "core/brick_tile.hpp", "core/brick_lookup.hpp", "octree.hpp", "core/octree_view.hpp",
-                "reducers.hpp", "octree_dag.hpp", "backend_octree.hpp", "backend_octree_dag.hpp", "core/octree_dag_view.hpp", "io/nanovdb.hpp"]),
+               ["sparse.hpp", "host_sparse.hpp", "sparse_merge.hpp", "core/brick_table.hpp", "core/brick_tile.hpp", "sparse/brick_lookup.hpp", "octree.hpp", "core/octree_view.hpp",
+                "reducers.hpp", "octree_dag.hpp", "backend_octree.hpp", "backend_octree_dag.hpp", "core/octree_dag_view.hpp", "sparse/io/nanovdb.hpp"]),
     "levels": ("Levels and rays of dense grids", "Coarser levels of targets, levels of light for cone tracing, rays through bits.",
-               ["dense_levels.hpp", "direction_mips.hpp", "dense_bits.hpp", "core/cell_walk.hpp"]),
+               ["dense_levels.hpp", "direction_mips.hpp", "dense_bits.hpp", "levels/cell_walk.hpp"]),
     "slabs": ("Slabs", "Meshes and grids beyond one memory or one machine: plans, out-of-core streams, MPI.",
               ["slabs/stream.hpp", "slabs/mpi.hpp", "slabs/plan.hpp", "slabs/records.hpp", "slabs/bins.hpp"]),
     "streams": ("Streams and graphs", "Calls that never wait, with memory of the caller. For cuda_backend.",
-                ["device/voxelize_async.cuh", "device/abuffer_async.cuh", "device/optional/solid_async.cuh",
-                 "device/optional/sparse_result.cuh", "device/optional/sparse_async.cuh", "device/optional/sparse_merge_async.cuh", "device/optional/sparse_solid_async.cuh", "device/optional/program_async.cuh",
-                 "device/optional/program_arrays.cuh",
-                 "device/optional/element_async.cuh"]),
+                ["device/voxelize_async.cuh", "device/abuffer_async.cuh", "solid/device/solid_async.cuh",
+                 "sparse/device/sparse_result.cuh", "sparse/device/sparse_async.cuh", "sparse/device/sparse_merge_async.cuh", "sparse/device/sparse_solid_async.cuh", "programs/device/program_async.cuh",
+                 "programs/device/program_arrays.cuh",
+                 "programs/device/element_async.cuh"]),
     "arithmetic": ("Arithmetic for shaders", "Operations with the same bits on every compiler and device, and views of arrays.",
                    ["core/exact.hpp", "core/pack.hpp"]),
 }
 # Shown nowhere: what the library uses to write NanoVDB files.
-HIDDEN = ["io/nanovdb_nodes.hpp"]
+HIDDEN = ["sparse/io/nanovdb_nodes.hpp"]
 PYTHON = ["Grid", "fit", "voxelize", "solid", "bake", "sparse", "fragments", "Fragments", "save", "render", "view", "View",
           "DroppedTrianglesWarning", "OpenMeshWarning"]
 

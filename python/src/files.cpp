@@ -5,7 +5,7 @@
 #include "preview.hpp"
 
 #include <voxelpipe/core/brick_table.hpp>
-#include <voxelpipe/io/nanovdb.hpp>
+#include <voxelpipe/sparse/io/nanovdb.hpp>
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>

@@ -4,7 +4,7 @@
 
 // Shared by the modules for CPU and GPU: names of options, and a failed status as a Python exception.
 
-#include <voxelpipe/solid.hpp>
+#include <voxelpipe/solid/solid.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <nanobind/nanobind.h>

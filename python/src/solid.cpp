@@ -3,7 +3,7 @@
 #include "arrays.hpp"
 #include "parts.hpp"
 
-#include <voxelpipe/solid.hpp>
+#include <voxelpipe/solid/solid.hpp>
 
 #include <optional>
 

@@ -7,7 +7,7 @@
 
 #include "values.hpp"
 
-#include <voxelpipe/sparse.hpp>
+#include <voxelpipe/sparse/sparse.hpp>
 
 namespace voxelpipe::python {
 

@@ -9,7 +9,7 @@
 #include "stopwatch.hpp"
 #include "voxels.hpp"
 
-#include <voxelpipe/direction_mips.hpp>
+#include <voxelpipe/levels/direction_mips.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <algorithm>

@@ -8,7 +8,7 @@
 #include "world.hpp"
 
 #include <voxelpipe/abuffer.hpp>
-#include <voxelpipe/brick_bits.hpp>
+#include <voxelpipe/levels/brick_bits.hpp>
 
 namespace gi {
 

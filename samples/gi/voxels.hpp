@@ -9,7 +9,7 @@
 #include "cones.hpp"
 #include "rays.hpp"
 
-#include <voxelpipe/dense_bits.hpp>
+#include <voxelpipe/levels/dense_bits.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 namespace gi {

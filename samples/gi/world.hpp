@@ -10,7 +10,7 @@
 
 #include "../voxelize/surface.hpp"
 
-#include <voxelpipe/direction_mips.hpp>
+#include <voxelpipe/levels/direction_mips.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <glm/glm.hpp>

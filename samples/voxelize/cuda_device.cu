@@ -5,7 +5,7 @@
 
 #include "pipeline.hpp"
 
-#include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/device/surface_calls.cuh>
 #include <voxelpipe/slabs/device_set.cuh>
 
 #include <algorithm>

@@ -4,7 +4,7 @@
 
 // Samples of fields for both backends, and their digest, the same on every machine.
 
-#include <voxelpipe/field.hpp>
+#include <voxelpipe/programs/field.hpp>
 
 #include <bit>
 #include <cstdint>

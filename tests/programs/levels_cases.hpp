@@ -4,9 +4,9 @@
 
 // Levels of dense grids, samples of light and rays through bits, for both backends.
 
-#include <voxelpipe/brick_bits.hpp>
-#include <voxelpipe/dense_bits.hpp>
-#include <voxelpipe/dense_levels.hpp>
+#include <voxelpipe/levels/brick_bits.hpp>
+#include <voxelpipe/levels/dense_bits.hpp>
+#include <voxelpipe/levels/dense_levels.hpp>
 
 #include <cstdint>
 #include <cstring>

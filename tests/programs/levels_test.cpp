@@ -8,7 +8,7 @@
 
 #include "api_model.hpp"
 
-#include <voxelpipe/octree.hpp>
+#include <voxelpipe/sparse/octree.hpp>
 
 #include <gtest/gtest.h>
 

@@ -6,8 +6,8 @@
 
 #include "solid_support.hpp"
 
-#include <voxelpipe/core/crossing.hpp>
-#include <voxelpipe/core/small_crossing.hpp>
+#include <voxelpipe/solid/core/crossing.hpp>
+#include <voxelpipe/solid/core/small_crossing.hpp>
 
 #include <algorithm>
 #include <string>

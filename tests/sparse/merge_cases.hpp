@@ -7,7 +7,7 @@
 #include "api_model.hpp"
 #include "box_mesh.hpp"
 
-#include <voxelpipe/sparse.hpp>
+#include <voxelpipe/sparse/sparse.hpp>
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include "api_model.hpp"
 
 #include <algorithm>
-#include <voxelpipe/io/nanovdb.hpp>
+#include <voxelpipe/sparse/io/nanovdb.hpp>
 
 #include <gtest/gtest.h>
 

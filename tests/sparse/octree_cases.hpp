@@ -6,7 +6,7 @@
 
 #include "test_support.hpp"
 
-#include <voxelpipe/backend_octree_dag.hpp>
+#include <voxelpipe/sparse/backend_octree_dag.hpp>
 
 #include <gtest/gtest.h>
 

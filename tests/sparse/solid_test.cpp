@@ -8,7 +8,7 @@
 #include "box_mesh.hpp"
 #include "triangles.hpp"
 
-#include <voxelpipe/sparse.hpp>
+#include <voxelpipe/sparse/sparse.hpp>
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include "merge_cases.hpp"
 #include "triangles.hpp"
 
-#include <voxelpipe/backend_octree_dag.hpp>
+#include <voxelpipe/sparse/backend_octree_dag.hpp>
 
 #include <gtest/gtest.h>
 

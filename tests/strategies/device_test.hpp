@@ -6,7 +6,7 @@
 // cpu_backend and on cuda_backend and compares every byte of the results and every counter.
 
 #include <cpu_ref/backend.hpp>
-#include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/device/surface_calls.cuh>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <gtest/gtest.h>

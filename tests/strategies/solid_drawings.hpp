@@ -7,7 +7,7 @@
 
 #include "device_test.hpp"
 
-#include <voxelpipe/device/optional/solid_async.cuh>
+#include <voxelpipe/solid/device/solid_async.cuh>
 
 #include <algorithm>
 #include <bit>

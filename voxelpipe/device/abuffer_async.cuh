@@ -6,6 +6,7 @@
 // lie in the caller's workspace, so a CUDA graph can capture the call and replay it with changed vertices. Capacities
 // are fixed beforehand; if the fragments do not fit, the lists are empty, and read_status reports what was needed.
 
+#include <voxelpipe/device/call/abuffer_call.cuh>
 #include <voxelpipe/device/fragments/store_lists.cuh>
 #include <voxelpipe/device/scene/subset.cuh>
 #include <voxelpipe/device/voxelize_async.cuh>

@@ -9,10 +9,10 @@
 //   column_parities   slabs that are known before the triangles come, gaps between them allowed: a layer of bits a slab
 //   column_sweep      slabs that follow each other, wherever they turn out to begin: three layers of bits
 
-#include <voxelpipe/core/crossing.hpp>
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/slabs/plan.hpp>
-#include <voxelpipe/solid.hpp>
+#include <voxelpipe/solid/core/crossing.hpp>
+#include <voxelpipe/solid/solid.hpp>
 
 #include <algorithm>
 #include <cstddef>

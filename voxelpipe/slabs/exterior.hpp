@@ -8,10 +8,10 @@
 // winds up and down takes as many sweeps as it has turns. Several machines may have a part of the grid each, and tell
 // each other of their borders (mpi_exterior.hpp). Needs POSIX files.
 
-#include <voxelpipe/core/bit_grid.hpp>
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/slabs/bins.hpp>
 #include <voxelpipe/slabs/plan.hpp>
+#include <voxelpipe/solid/core/bit_grid.hpp>
 
 #include <algorithm>
 #include <cstddef>

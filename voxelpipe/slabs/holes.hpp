@@ -6,8 +6,8 @@
 // cancelled in bins, on disk beyond a budget, and only those of the holes' boundaries are held. The cones go to the
 // call of each slab (solid_options::cones). Needs POSIX files.
 
-#include <voxelpipe/core/holes.hpp>
 #include <voxelpipe/slabs/bins.hpp>
+#include <voxelpipe/solid/core/holes.hpp>
 
 #include <algorithm>
 #include <cstddef>

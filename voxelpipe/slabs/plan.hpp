@@ -11,9 +11,9 @@
 //   cover       as few slabs as keep each one below a limit
 
 #include <voxelpipe/core/bisect.hpp>
-#include <voxelpipe/core/crossing.hpp>
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/grid.hpp>
+#include <voxelpipe/solid/core/crossing.hpp>
 #include <voxelpipe/status.hpp>
 #include <voxelpipe/triangle_counts.hpp>
 

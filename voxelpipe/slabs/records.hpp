@@ -8,7 +8,7 @@
 
 #include <voxelpipe/core/threads.hpp>
 #include <voxelpipe/slabs/plan.hpp>
-#include <voxelpipe/solid.hpp>
+#include <voxelpipe/solid/solid.hpp>
 #include <voxelpipe/voxelize.hpp>
 
 #include <glm/vec3.hpp>

@@ -10,15 +10,15 @@
 //   vote          add() all triangles, begin();              enter() each slab with its triangles, of(), leave()
 //   exterior      begin(), add_walls() of all slabs, flood(); of() each slab
 
-#include <voxelpipe/core/bit_grid.hpp>
-#include <voxelpipe/core/holes.hpp>
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/slabs/columns.hpp>
 #include <voxelpipe/slabs/exterior.hpp>
 #include <voxelpipe/slabs/holes.hpp>
 #include <voxelpipe/slabs/plan.hpp>
 #include <voxelpipe/slabs/records.hpp>
-#include <voxelpipe/solid.hpp>
+#include <voxelpipe/solid/core/bit_grid.hpp>
+#include <voxelpipe/solid/core/holes.hpp>
+#include <voxelpipe/solid/solid.hpp>
 
 #include <cstdint>
 #include <optional>

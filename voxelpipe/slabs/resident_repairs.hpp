@@ -10,9 +10,7 @@
 //   vote          the same
 //   exterior      for each call find(), with the cover of all slabs if it needs_walls(), of() each slab
 
-#include <voxelpipe/core/bit_grid.hpp>
 #include <voxelpipe/core/brick_table.hpp>
-#include <voxelpipe/core/holes.hpp>
 #include <voxelpipe/core/pack.hpp>
 #include <voxelpipe/core/threads.hpp>
 #include <voxelpipe/grid.hpp>
@@ -20,7 +18,9 @@
 #include <voxelpipe/slabs/exterior.hpp>
 #include <voxelpipe/slabs/holes.hpp>
 #include <voxelpipe/slabs/plan.hpp>
-#include <voxelpipe/solid.hpp>
+#include <voxelpipe/solid/core/bit_grid.hpp>
+#include <voxelpipe/solid/core/holes.hpp>
+#include <voxelpipe/solid/solid.hpp>
 
 #include <algorithm>
 #include <cstddef>

@@ -22,8 +22,8 @@
 #include <voxelpipe/slabs/slab_arrays.hpp>
 #include <voxelpipe/slabs/slab_queue.hpp>
 #include <voxelpipe/slabs/stream_options.hpp>
-#include <voxelpipe/solid.hpp>
-#include <voxelpipe/sparse.hpp>
+#include <voxelpipe/solid/solid.hpp>
+#include <voxelpipe/sparse/sparse.hpp>
 #include <voxelpipe/voxelize.hpp>
 
 #include <algorithm>

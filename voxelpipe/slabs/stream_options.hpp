@@ -5,7 +5,7 @@
 // How a stream works.
 
 #include <voxelpipe/slabs/records.hpp>
-#include <voxelpipe/solid.hpp>
+#include <voxelpipe/solid/solid.hpp>
 #include <voxelpipe/voxelize.hpp>
 
 #include <cstdint>

@@ -9,7 +9,7 @@
 
 namespace voxelpipe::tuning {
 
-// ---- crossings (device/solid/small_rows.cuh, large_rows.cuh) --------------------------------------------------------
+// ---- crossings (solid/device/small_rows.cuh, large_rows.cuh) --------------------------------------------------------
 
 inline constexpr int small_row_blocks = 3;        // of the first pass
 inline constexpr std::uint32_t looks_at_once = 4; // triangles of a lane whose corners are loaded together
@@ -22,7 +22,7 @@ inline constexpr int lines_per_item = 32; // of a work item: rows of one z, one 
 inline constexpr int rows_per_line = 256; // of a work item
 inline constexpr int wide_line_batch = 8; // crossings that the 128-bit path returns at once
 
-// ---- rows of bits (device/solid/parity_rows.cuh, fill_bit_rows.cuh) -------------------------------------------------
+// ---- rows of bits (solid/device/parity_rows.cuh, fill_bit_rows.cuh) -------------------------------------------------
 
 inline constexpr int parity_blocks = 4;
 inline constexpr std::uint32_t row_words = 4;    // of a lane: one store of 16 bytes
@@ -31,7 +31,7 @@ inline constexpr std::uint32_t parity_loads = 4; // groups of row_words that are
 inline constexpr std::uint32_t lane_entries = 32;
 inline constexpr int fill_blocks = 4;
 
-// ---- repair::exterior (device/solid/exterior.cuh) -------------------------------------------------------------------
+// ---- repair::exterior (solid/device/exterior.cuh) -------------------------------------------------------------------
 
 inline constexpr int flood_tile_z = 16; // of a tile of 32 x 32 x 16 voxels, which a warp has in registers
 inline constexpr int flood_blocks = 3;

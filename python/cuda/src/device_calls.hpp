@@ -5,7 +5,7 @@
 // The calls of the module for GPUs, without CUDA or Python: what nvcc compiles on one side and the bindings on the
 // other. All arrays are in the device's memory, and the caller's. Every call waits for its stream at its end.
 
-#include <voxelpipe/solid.hpp>
+#include <voxelpipe/solid/solid.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <cstddef>

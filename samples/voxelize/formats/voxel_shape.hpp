@@ -8,7 +8,7 @@
 
 #include "../sparse/sparse_volume.hpp"
 
-#include <voxelpipe/host_sparse.hpp>
+#include <voxelpipe/sparse/host_sparse.hpp>
 
 #include <array>
 #include <bit>

@@ -11,7 +11,7 @@
 #include "../targets.hpp"
 
 #include <cpu_ref/backend.hpp>
-#include <voxelpipe/dense_levels.hpp>
+#include <voxelpipe/levels/dense_levels.hpp>
 
 #include <glm/gtc/type_precision.hpp>
 #include <glm/vec3.hpp>

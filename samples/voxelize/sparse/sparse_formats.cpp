@@ -14,8 +14,8 @@
 #include "../formats/voxel_shape.hpp"
 #include "../page/page.hpp"
 
-#include <voxelpipe/host_sparse.hpp>
-#include <voxelpipe/io/nanovdb.hpp>
+#include <voxelpipe/sparse/host_sparse.hpp>
+#include <voxelpipe/sparse/io/nanovdb.hpp>
 
 #include <algorithm>
 #include <cstring>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sparse_solid.hpp"
 
-#include <voxelpipe/host_sparse.hpp>
+#include <voxelpipe/sparse/host_sparse.hpp>
 
 #include <algorithm>
 #include <array>

@@ -5,9 +5,9 @@
 #include "../parallel.hpp"
 #include "../targets.hpp"
 
-#include <voxelpipe/core/brick_lookup.hpp>
-#include <voxelpipe/host_sparse.hpp>
-#include <voxelpipe/sparse_merge.hpp>
+#include <voxelpipe/sparse/brick_lookup.hpp>
+#include <voxelpipe/sparse/host_sparse.hpp>
+#include <voxelpipe/sparse/sparse_merge.hpp>
 
 #include <algorithm>
 #include <array>

@@ -7,7 +7,7 @@
 #include "../triangle_stream.hpp"
 #include "../voxelizer.hpp"
 
-#include <voxelpipe/core/holes.hpp>
+#include <voxelpipe/solid/core/holes.hpp>
 
 #include <cstddef>
 #include <cstdint>

@@ -10,7 +10,7 @@
 
 #include <voxelpipe/slabs/columns.hpp>
 #include <voxelpipe/slabs/plan.hpp>
-#include <voxelpipe/solid.hpp>
+#include <voxelpipe/solid/solid.hpp>
 
 #include <cstddef>
 #include <optional>

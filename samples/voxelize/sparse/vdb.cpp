@@ -6,7 +6,7 @@
 #include "../formats/progress.hpp"
 #include "../srgb.hpp"
 
-#include <voxelpipe/host_sparse.hpp>
+#include <voxelpipe/sparse/host_sparse.hpp>
 
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>

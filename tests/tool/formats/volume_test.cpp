@@ -4,7 +4,7 @@
 #include "sparse/sparse_formats.hpp"
 #include "test_volumes.hpp"
 
-#include <voxelpipe/io/nanovdb_layout.hpp>
+#include <voxelpipe/sparse/io/nanovdb_layout.hpp>
 
 #include <algorithm>
 #include <cstring>

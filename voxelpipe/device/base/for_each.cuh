@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A functor for each of many numbers: the passes of programs (programs/passes.hpp), points and lines. Compiled by
-// programs that use these, and by no other.
+// A functor for each of many numbers: the passes of programs (programs/passes/passes.hpp), points and lines. Compiled
+// by programs that use these, and by no other.
 
 #include <voxelpipe/device/base/launch.cuh>
 

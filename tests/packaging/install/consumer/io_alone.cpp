@@ -3,7 +3,7 @@
 
 // A program that writes files and voxelizes nothing, so links voxelpipe::io alone: one brick of three voxels, made by
 // hand, as a NanoVDB file. io_alone FILE
-#include <voxelpipe/io/nanovdb.hpp>
+#include <voxelpipe/sparse/io/nanovdb.hpp>
 
 #include <cstdint>
 #include <cstdio>

@@ -1,0 +1,201 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Meshes with holes: repair::close_holes adds cones to the geometry, repair::exterior decides each body's voxels on a
+// dense grid of bits, as repair::vote does (solid_vote.hpp). All three give sets that no order of work can change.
+
+#include <cpu_ref/solid/solid_cover.hpp>
+#include <voxelpipe/solid/core/bit_grid.hpp>
+#include <voxelpipe/solid/core/holes.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe::cpu {
+
+using core::bit_grid;
+
+// ---- close_holes ----------------------------------------------------------------------------------------------------
+
+// Puts the cones of each body behind its draws' parts. False if there are then more triangles than can be numbered.
+[[nodiscard]] inline bool add_cones(solid_geometry& s, const solid_options& options, solid_counters& counts) {
+    std::vector<geometry::part> parts;
+    std::vector<std::uint32_t> body;
+    std::vector<bool> is_repair;
+    s.cones.reserve(s.parts.size()); // stays where the parts point to
+    for (std::size_t first = 0; first < s.parts.size();) {
+        std::size_t last = first;
+        std::vector<core::hole_part> of_body;
+        for (; last < s.parts.size() && s.body[last] == s.body[first]; ++last) {
+            const geometry::part& p = s.parts[last];
+            of_body.push_back({p.positions, p.num_vertices, p.triangles, p.num_triangles});
+            parts.push_back(p);
+            body.push_back(s.body[last]);
+            is_repair.push_back(false);
+        }
+        const core::hole_cones& cones =
+            s.cones.emplace_back(options.cones != nullptr ? core::moved(options.cones[s.body[first]], s.snap.offset)
+                                                          : core::close_holes(of_body, options.max_hole_edges));
+        counts.hole_edges += cones.edges;
+        counts.holes += cones.holes;
+        counts.cones += cones.cones;
+        if (!cones.triangles.empty()) {
+            const auto triangles = static_cast<std::uint32_t>(cones.triangles.size()),
+                       vertices = static_cast<std::uint32_t>(cones.positions.size());
+            parts.push_back(
+                {{cones.triangles.data(), triangles, vertices}, cones.positions.data(), triangles, vertices});
+            body.push_back(s.body[first]);
+            is_repair.push_back(true);
+        }
+        first = last;
+    }
+    s.parts = std::move(parts);
+    s.body = std::move(body);
+    s.is_repair = std::move(is_repair);
+    s.first_primitive.clear();
+    std::uint64_t first = 0;
+    for (const geometry::part& p : s.parts) {
+        s.first_primitive.push_back(static_cast<std::uint32_t>(first));
+        first += p.num_triangles;
+        if (first > ~std::uint32_t{0}) return false;
+    }
+    s.first_primitive.push_back(static_cast<std::uint32_t>(first));
+    return true;
+}
+
+// ---- what exterior and vote have in common --------------------------------------------------------------------------
+
+// Appends the bits of one body within `box` to the beams, of which `beams` has all, in order.
+template <class BitsAt>
+void add_bits(const execution& how, const row_numbers& rows, const core::voxel_box& box, std::uint32_t draw,
+              std::vector<beam_words>& beams, const BitsAt& bits_at) {
+    parallel_for(how.threads, beams.size(), [&](unsigned, std::size_t b) {
+        for (std::uint32_t place = 0; place < tile_rows; ++place) {
+            const std::uint64_t row = b * tile_rows + place;
+            const int y = rows.y(row), z = rows.z(row);
+            if (y < box.lo[1] || z < box.lo[2] || y > box.hi[1] || z > box.hi[2]) continue;
+            for (int x = 0; x <= box.hi[0]; x += 32) {
+                std::uint32_t bits = bits_at(x, y, z);
+                if (box.hi[0] - x < 31) bits &= (1u << (box.hi[0] - x + 1)) - 1;
+                if (box.lo[0] > x) bits &= box.lo[0] - x < 32 ? ~0u << (box.lo[0] - x) : 0u;
+                if (bits != 0) beams[b].words.push_back({place, draw, static_cast<std::uint32_t>(x) / 32, bits});
+            }
+        }
+    });
+}
+
+// Calls visit(x, y, z, bits) for the words of one body.
+template <class Visit>
+void for_each_word(const std::vector<beam_words>& cover, const row_numbers& rows, std::uint32_t draw,
+                   const Visit& visit) {
+    for (const beam_words& beam : cover)
+        for (const row_word& w : beam.words)
+            if (w.draw == draw) {
+                const std::uint64_t row = beam.beam * tile_rows + w.row;
+                visit(static_cast<int>(w.word) * 32, rows.y(row), rows.z(row), w.bits);
+            }
+}
+
+[[nodiscard]] inline std::vector<beam_words> all_beams(const row_numbers& rows) {
+    std::vector<beam_words> beams(rows.num_beams());
+    for (std::size_t b = 0; b < beams.size(); ++b) beams[b].beam = b;
+    return beams;
+}
+
+// Puts the words of several bodies in order, and drops beams without any.
+inline void end_beams(const execution& how, std::vector<beam_words>& beams) {
+    parallel_for(how.threads, beams.size(), [&](unsigned, std::size_t b) { sort_words(beams[b].words); });
+    beams.erase(std::remove_if(beams.begin(), beams.end(), [](const beam_words& b) { return b.words.empty(); }),
+                beams.end());
+}
+
+// ---- exterior -------------------------------------------------------------------------------------------------------
+
+// What solid_options::slab gives, in the numbers of the geometry's grid, in which the slab begins at its lead.
+class slab_bits {
+public:
+    slab_bits(const std::uint64_t* bits, const solid_geometry& s)
+        : bits_(bits), lead_(s.lead), rows_(s.where.extent.y - s.lead.y),
+          words_((static_cast<std::size_t>(s.where.extent.x - s.lead.x) + 63) / 64) {}
+    // The 32 bits from x on, a multiple of 32; those before the slab, and behind its row, are 0 and of no meaning.
+    [[nodiscard]] std::uint32_t operator()(int x, int y, int z) const {
+        const std::uint64_t* const r =
+            bits_ + (static_cast<std::size_t>(z - lead_.z) * static_cast<std::size_t>(rows_) +
+                     static_cast<std::size_t>(y - lead_.y)) *
+                        words_;
+        const int first = x - lead_.x; // above -32
+        if (first < 0) return static_cast<std::uint32_t>(r[0]) << -first;
+        const auto i = static_cast<std::size_t>(first) / 64;
+        const int at = first % 64;
+        std::uint64_t w = r[i] >> at;
+        if (at > 32 && i + 1 < words_) w |= r[i + 1] << (64 - at);
+        return static_cast<std::uint32_t>(w);
+    }
+
+private:
+    const std::uint64_t* bits_;
+    glm::ivec3 lead_;
+    int rows_;
+    std::size_t words_;
+};
+
+// Each body's complement of what a flood from outside the grid reaches, through voxels further than `closing` from its
+// cover in the max norm; grown back by as much.
+[[nodiscard]] inline std::vector<beam_words> find_interior(const execution& how, const solid_geometry& s, int closing,
+                                                           std::vector<beam_words>&& cover) {
+    const stopwatch watch(how.times, &stage_times::fine_raster);
+    const row_numbers rows(s.where.extent);
+    std::vector<beam_words> beams;
+    const int ring = closing + 1;
+    for (std::uint32_t draw = 0; draw <= s.body.back(); ++draw) {
+        bit_grid grid(s.where.extent + 2 * ring);
+        for_each_word(cover, rows, draw, [&](int x, int y, int z, std::uint32_t bits) {
+            grid.set_bits(x + ring, y + ring, z + ring, bits);
+        });
+        core::dilate(grid, closing, how.threads);
+        grid = core::flood(grid);
+        core::dilate(grid, closing, how.threads);
+        if (draw == 0) beams = all_beams(rows); // behind the grid, which is what there may be no memory for
+        add_bits(how, rows, s.whole_box(), draw, beams,
+                 [&](int x, int y, int z) { return ~grid.get_bits(x + ring, y + ring, z + ring); });
+    }
+    end_beams(how, beams);
+    return beams;
+}
+
+// The same for a slab of which a flood of the whole grid has decided all voxels.
+[[nodiscard]] inline std::vector<beam_words> take_interior(const execution& how, const solid_geometry& s,
+                                                           const solid_slab& slab) {
+    const stopwatch watch(how.times, &stage_times::fine_raster);
+    const row_numbers rows(s.where.extent);
+    std::vector<beam_words> beams = all_beams(rows);
+    add_bits(how, rows, s.whole_box(), 0, beams, slab_bits(slab.inside, s));
+    end_beams(how, beams);
+    return beams;
+}
+
+// The code and the counts that a cover has, of its triangles.
+[[nodiscard]] inline cover_list count_triangles(const solid_geometry& s) {
+    cover_list none;
+    const core::voxel_box whole = s.whole_box();
+    for (const geometry::part& p : s.parts)
+        for (std::uint32_t i = 0; i < p.num_triangles; ++i) {
+            const glm::uvec3 t = p.triangles[i];
+            if (t.x >= p.num_vertices || t.y >= p.num_vertices || t.z >= p.num_vertices) {
+                none.code = status_code::index_out_of_range;
+                return none;
+            }
+            core::voxel_box reach{};
+            core::count_class(none.counts,
+                              core::classify<coverage::conservative>(p.positions[t.x], p.positions[t.y],
+                                                                     p.positions[t.z], s.snap.fraction, whole, reach));
+        }
+    none.counts.triangles_in = s.triangles_in;
+    return none;
+}
+
+} // namespace voxelpipe::cpu

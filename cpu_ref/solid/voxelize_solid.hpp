@@ -1,0 +1,38 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// voxelize_solid on CPU threads, into framebuffers and A-buffers.
+
+#include <cpu_ref/cpu_backend.hpp>
+#include <cpu_ref/solid/solid.hpp>
+#include <voxelpipe/solid/solid.hpp>
+
+#include <cstdint>
+#include <span>
+
+namespace voxelpipe::core {
+
+// Implement voxelize_solid. Arguments are validated. Exceptions of a user's shader pass through.
+template <class Draw, class... Targets>
+[[nodiscard]] status run_module(solid_tag, cpu_backend& backend, std::span<const Draw> draws, const grid& g,
+                                const framebuffer_view<Targets...>& fb, const solid_options& options,
+                                std::uint64_t triangles_in) {
+    return backend.guarded(triangles_in, [&](const cpu::execution& how) {
+        return cpu::run_solid(how, draws, g, glm::ivec3(0), options, [&](const auto& sweep, const status& result) {
+            return cpu::draw_solid(how, sweep, draws, g, options, fb, result);
+        });
+    });
+}
+template <class Draw, class Payload>
+[[nodiscard]] status run_module(solid_tag, cpu_backend& backend, std::span<const Draw> draws, const grid& g,
+                                abuffer<cpu_backend, Payload>& lists, const solid_options& options,
+                                std::uint64_t triangles_in) {
+    return backend.guarded(triangles_in, [&](const cpu::execution& how) {
+        return cpu::run_solid(how, draws, g, glm::ivec3(0), options, [&](const auto& sweep, const status& result) {
+            return cpu::list_solid(how, backend, sweep, draws, g, lists, result);
+        });
+    });
+}
+
+} // namespace voxelpipe::core

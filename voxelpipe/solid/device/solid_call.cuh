@@ -1,0 +1,395 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Host side of a solid's call: what memory it takes (plan_memory) and its launches on one stream without a wait
+// (launch), up to the sorted entries for any output, or through the targets of a framebuffer.
+
+#include <voxelpipe/device/base/stage_clock.cuh>
+#include <voxelpipe/device/call/graph_cache.cuh>
+#include <voxelpipe/device/scene/check_indices.cuh>
+#include <voxelpipe/device/scene/scene_memory.cuh>
+#include <voxelpipe/device/targets/clear_target.cuh>
+#include <voxelpipe/solid/device/emit_crossings.cuh>
+#include <voxelpipe/solid/device/exterior.cuh>
+#include <voxelpipe/solid/device/fill_bit_rows.cuh>
+#include <voxelpipe/solid/device/fill_rows.cuh>
+#include <voxelpipe/solid/device/parity_rows.cuh>
+#include <voxelpipe/solid/device/solid_cones.cuh>
+#include <voxelpipe/solid/device/solid_cover.cuh>
+#include <voxelpipe/solid/device/vote.cuh>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <vector>
+
+namespace voxelpipe::device {
+
+// All but the draws and the output that the launches of a call depend on.
+struct solid_plan {
+    grid g;
+    solid_options options;
+    std::uint32_t num_primitives;
+    capacities limits;
+};
+
+// The draws of a call, and their entries.
+template <class Draw>
+struct solid_entries;
+template <class Mesh, class VertexShader, class SolidShader>
+struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
+    using draw_type = draw<Mesh, VertexShader, SolidShader>;
+    using solid_shader = SolidShader;
+
+    std::span<const draw_type> draws;
+    std::span<const cone_part> cones; // of each body, or none
+    solid_plan plan;
+    stage_clock* clock = nullptr;
+
+    // num_primitives: with the triangles of the cones.
+    solid_entries(std::span<const draw_type> draws_, const grid& g, const solid_options& options,
+                  std::uint32_t num_primitives, const capacities& limits, std::span<const cone_part> cones_ = {})
+        : draws(draws_), cones(cones_) {
+        std::memset(static_cast<void*>(&plan), 0, sizeof(plan)); // padding is part of a graph's key
+        plan.g = g;
+        plan.options = options;
+        plan.num_primitives = num_primitives;
+        plan.limits = limits;
+    }
+
+    // True if entries, keys and work items of the call can be numbered.
+    [[nodiscard]] bool fits() const {
+        return plan.limits.fragments <= max_listed_entries && num_keys() <= (uint128{1} << 64) &&
+               row_triangles::holds(plan.num_primitives, plan.g.extent);
+    }
+    [[nodiscard]] bool has_cover() const { return makes_sets() || plan.options.extent != solid_extent::centre; }
+    // Bodies are sets of voxels that no crossings are swept for.
+    [[nodiscard]] bool makes_sets() const {
+        return plan.options.repair == repair::exterior || plan.options.repair == repair::vote;
+    }
+    // A body a draw, of several.
+    [[nodiscard]] bool is_split() const { return plan.options.bodies == bodies::draw && draws.size() > 1; }
+    [[nodiscard]] row_grid rows() const { return {plan.g.extent, core::make_snap_transform(plan.g).fraction}; }
+    [[nodiscard]] sweep_rules rules() const {
+        const solid_extent extent = makes_sets() ? solid_extent::outer : plan.options.extent;
+        return {rows(), plan.g.offset, plan.options.rule, extent, plan.options.count_voxels, !makes_sets()};
+    }
+    // The mesh is read, shaded and snapped by the kernel that makes the crossings: once a corner, not once a vertex.
+    [[nodiscard]] bool shades_on_the_spot() const {
+        return is_cheap<VertexShader> && draws.size() == 1 && cones.empty() && !has_cover();
+    }
+
+    struct memory {
+        vertex_positions positions{};
+        std::uint32_t* codes = nullptr; // of vertices, where they are shaded on the spot
+        draw_geometry* geometries = nullptr;
+        SolidShader* shaders = nullptr; // by draw, where they differ
+        row_triangles kept{};
+        crossing_memory list;
+        row_groups by_row;
+        cover_memory cover;
+        exterior_memory exterior;
+        vote_memory vote;
+    };
+    // Crossings toggle bits, are grouped by row, or go into one list that is sorted, and the cover with them.
+    enum class crossing_use { toggles, groups, sorts };
+    // counts: of the rows, for crossing_use::groups.
+    [[nodiscard]] memory take(arena& a, crossing_use use = crossing_use::sorts, std::uint32_t* counts = nullptr) const {
+        memory m;
+        std::size_t vertices = 0, most = 0;
+        for (const draw_type& d : draws) {
+            vertices += d.mesh.num_vertices();
+            most = std::max<std::size_t>(most, d.mesh.num_triangles());
+        }
+        for (const cone_part& c : cones) most = std::max(most, std::size_t{c.num_triangles});
+        if (shades_on_the_spot())
+            m.codes = a.take<std::uint32_t>(vertices);
+        else
+            m.positions = vertex_positions::take(a, vertices);
+        m.geometries = a.take<draw_geometry>(num_parts() > 1 ? num_parts() : 0);
+        if (is_split()) m.shaders = a.take<SolidShader>(draws.size());
+        m.kept = row_triangles::take(a, plan.num_primitives);
+        if (use == crossing_use::sorts)
+            m.list = crossing_memory::take(a, plan.limits.fragments, num_keys(), num_bodies());
+        if (use == crossing_use::groups)
+            m.by_row = row_groups::take(a, plan.limits.fragments, rows().num_rows(), counts);
+        if (has_cover()) m.cover = cover_memory::take(a, most, plan.g, plan.limits);
+        if (plan.options.repair == repair::exterior && plan.options.slab == nullptr)
+            m.exterior = exterior_memory::take(a, plan.g.extent, plan.options.closing);
+        if (plan.options.repair == repair::vote) m.vote = vote_memory::take(a, plan.g.extent);
+        return m;
+    }
+    [[nodiscard]] body_shaders<SolidShader> shaders(const memory& m, cudaStream_t stream) const {
+        if (!is_split()) return {draws[0].fragment_shader, nullptr};
+        upload(
+            m.shaders, draws.size(), [&](std::size_t d) { return draws[d].fragment_shader; }, stream);
+        return {draws[0].fragment_shader, m.shaders};
+    }
+
+    // Lists all entries and sorts them; state->list_fragments says how many there are.
+    [[nodiscard]] crossing_list launch(const memory& m, pipeline_state* state, cudaStream_t stream) const {
+        const crossing_appender sink{m.list.list(), is_split(), static_cast<std::uint32_t>(draws.size())};
+        if (makes_sets())
+            emit_sets(m, sink.list, state, stream);
+        else
+            emit(m, sink, {}, state, stream);
+        const crossing_list sorted = sort_crossings(m.list, state, plan.limits, stream);
+        end_stage(clock, &stage_times::tile_sort);
+        return sorted;
+    }
+    // Groups the crossings by row, in memory that is taken for crossing_use::groups. The cover stays in its mask.
+    void launch_groups(const memory& m, pipeline_state* state, cudaStream_t stream) const {
+        if (makes_sets())
+            emit_sets(m, {}, state, stream);
+        else
+            emit(m, crossing_appender{m.by_row.list, false, static_cast<std::uint32_t>(draws.size()), m.by_row.counts},
+                 {}, state, stream);
+        group_by_row(m.by_row, rows().num_rows(), state, plan.limits, stream);
+        end_stage(clock, &stage_times::tile_sort);
+    }
+    // Gives all crossings to a sink, and the list the cover where that is wanted. zeros: memory that is to be zero
+    // before; none unless shades_on_the_spot.
+    template <class Sink>
+    void emit(const memory& m, const Sink& sink, const zeroed_memory& zeros, pipeline_state* state,
+              cudaStream_t stream) const {
+        const row_triangles kept = m.kept.with(state);
+        if constexpr (is_cheap<VertexShader>) {
+            if (shades_on_the_spot()) {
+                const draw_type& d = draws[0];
+                const shaded_triangles<Mesh, VertexShader> triangles{
+                    {d.mesh, d.vertex_shader, core::make_snap_transform(plan.g), 0},
+                    m.codes,
+                    plan.num_primitives,
+                    static_cast<std::uint32_t>(d.mesh.positions.size())};
+                find_row_codes(triangles, rows(), zeros, state, stream);
+                end_stage(clock, &stage_times::vertex_shade);
+                emit_crossings(triangles, rows(), sink, kept, state, stream);
+                end_stage(clock, &stage_times::coarse_raster);
+                return;
+            }
+        }
+        std::vector<draw_geometry> geometry_of;
+        const geometry geo = shade(m, geometry_of, stream);
+        emit_crossings(stored_triangles{geo, rows(), plan.num_primitives, num_drawn(geometry_of)}, rows(), sink, kept,
+                       state, stream);
+        end_stage(clock, &stage_times::coarse_raster);
+        if constexpr (Sink::is_listing)
+            if (has_cover()) emit_cover(m, geo, geometry_of, sink.list, state, stream);
+    }
+
+private:
+    [[nodiscard]] std::size_t num_parts() const { return draws.size() + cones.size(); }
+    // Triangles of the draws, which are counted.
+    [[nodiscard]] std::uint32_t num_drawn(const std::vector<draw_geometry>& geometry_of) const {
+        return cones.empty() ? plan.num_primitives : geometry_of[draws.size()].first_primitive;
+    }
+    [[nodiscard]] std::uint32_t num_bodies() const { return is_split() ? static_cast<std::uint32_t>(draws.size()) : 1; }
+    [[nodiscard]] uint128 num_keys() const { return static_cast<uint128>(rows().num_rows()) * num_bodies(); }
+
+    [[nodiscard]] geometry shade(const memory& m, std::vector<draw_geometry>& geometry_of, cudaStream_t stream) const {
+        geometry geo{};
+        geo.num_draws = static_cast<std::uint32_t>(num_parts());
+        geo.num_primitives = plan.num_primitives;
+        geo.snap = core::make_snap_transform(plan.g);
+        geo.extent = plan.g.extent;
+        std::size_t vertex = 0;
+        std::uint32_t primitive = 0;
+        for (std::size_t d = 0; d < draws.size(); ++d) {
+            const Mesh& mesh = draws[d].mesh;
+            const vertex_positions positions = m.positions.from(vertex);
+            geometry_of.push_back(geometry_from(mesh, positions, primitive));
+            vertex_shade(mesh, draws[d].vertex_shader, geo.snap, static_cast<std::uint32_t>(d), positions,
+                         static_cast<no_varyings*>(nullptr), stream); // a solid has none
+            vertex += mesh.num_vertices();
+            primitive += static_cast<std::uint32_t>(mesh.num_triangles());
+        }
+        for (const cone_part& c : cones) {
+            geometry_of.push_back(c.geometry);
+            geometry_of.back().first_primitive = primitive;
+            primitive += c.num_triangles;
+        }
+        geo.one = geometry_of[0];
+        if (num_parts() > 1) {
+            upload(
+                m.geometries, num_parts(), [&](std::size_t d) { return geometry_of[d]; }, stream);
+            geo.many = m.geometries;
+        }
+        end_stage(clock, &stage_times::vertex_shade);
+        return geo;
+    }
+    // Calls f(body, first draw, behind its last draw).
+    template <class F>
+    void for_each_body(F&& f) const {
+        for (std::size_t d = 0; d < draws.size(); d = is_split() ? d + 1 : draws.size())
+            f(is_split() ? static_cast<std::uint32_t>(d) : 0u, d, is_split() ? d + 1 : draws.size());
+    }
+    // The mask of a body's cover, with its cones.
+    void cover_body(const memory& m, const geometry& geo, const std::vector<draw_geometry>& geometry_of,
+                    std::uint32_t body, std::size_t first, std::size_t last, pipeline_state* state,
+                    cudaStream_t stream) const {
+        m.cover.clear(plan.g, stream);
+        for (std::size_t d = first; d < last; ++d)
+            raster_cover(m.cover, geometry_of[d], static_cast<std::uint32_t>(draws[d].mesh.num_triangles()), geo,
+                         plan.g, state, stream);
+        if (!cones.empty())
+            raster_cover(m.cover, geometry_of[draws.size() + body], cones[body].num_triangles, geo, plan.g, state,
+                         stream);
+    }
+    // Bodies that repair::exterior or repair::vote decides, as runs of cover, or of one body as the mask. Waits.
+    void emit_sets(const memory& m, const crossing_list& list, pipeline_state* state, cudaStream_t stream) const {
+        std::vector<draw_geometry> geometry_of;
+        const geometry geo = shade(m, geometry_of, stream);
+        m.cover.start(stream);
+        for_each_body([&](std::uint32_t body, std::size_t first, std::size_t last) {
+            cover_body(m, geo, geometry_of, body, first, last, state, stream);
+            if (plan.options.repair == repair::exterior && plan.options.slab != nullptr) {
+                // The cover has counted the triangles; the inside is known.
+                copy_from_slab(m.cover.mask, plan.options.slab->inside, {plan.g.extent}, plan.g.extent.z, stream);
+            } else if (plan.options.repair == repair::exterior) {
+                fill_to_exterior(m.exterior, m.cover.mask, stream);
+            } else {
+                const std::uint32_t begin = geometry_of[first].first_primitive,
+                                    end = last < draws.size() ? geometry_of[last].first_primitive : plan.num_primitives;
+                add_votes(m.vote, stored_triangles{geo, rows(), plan.num_primitives, plan.num_primitives}, begin,
+                          end - begin, rows(), plan.options.slab, m.cover.mask, state, stream);
+            }
+            if (m.by_row.counts == nullptr) list_cover(m.cover, rows(), list, body, state, stream);
+        });
+        if (plan.options.repair == repair::exterior) {
+            take_counts(m.cover, state, stream);
+        }
+        end_stage(clock, &stage_times::fine_raster);
+    }
+    void emit_cover(const memory& m, const geometry& geo, const std::vector<draw_geometry>& geometry_of,
+                    const crossing_list& list, pipeline_state* state, cudaStream_t stream) const {
+        m.cover.start(stream);
+        for_each_body([&](std::uint32_t body, std::size_t first, std::size_t last) {
+            cover_body(m, geo, geometry_of, body, first, last, state, stream);
+            if (m.by_row.counts == nullptr) list_cover(m.cover, rows(), list, body, state, stream);
+        });
+        end_stage(clock, &stage_times::fine_raster);
+    }
+};
+
+template <class Draw, class Framebuffer>
+struct solid_call;
+template <class Mesh, class VertexShader, class SolidShader, class... Targets>
+struct solid_call<draw<Mesh, VertexShader, SolidShader>, framebuffer_view<Targets...>> {
+    using draw_type = draw<Mesh, VertexShader, SolidShader>;
+    using framebuffer_type = framebuffer_view<Targets...>;
+
+    solid_entries<draw_type> entries;
+    framebuffer_type fb;
+
+    static constexpr bool has_bytes =
+        std::is_trivially_copyable_v<draw_type> && std::is_trivially_copyable_v<framebuffer_type>;
+    [[nodiscard]] call_bytes bytes(const void* workspace, const void* page) const {
+        call_bytes b = bytes_of_call<solid_call>(workspace, page);
+        b.add(entries.plan);
+        b.add(fb);
+        for (const draw_type& d : entries.draws) b.add(d);
+        return b;
+    }
+
+    using parity = parity_target<SolidShader, framebuffer_type>;
+    // True if crossings change bits of the target where they lie. Then no capacity can be too small, and nothing fails
+    // once indices are known to be right.
+    [[nodiscard]] bool is_parity() const {
+        if constexpr (parity::is_possible)
+            return entries.plan.options.rule == fill_rule::even_odd && !entries.is_split() && !entries.has_cover() &&
+                   parity::suits(entries.draws[0].fragment_shader, fb);
+        return false;
+    }
+
+    // True if the crossings are grouped by row.
+    [[nodiscard]] bool is_grouped() const {
+        return fills_bit_rows<SolidShader, framebuffer_type> && !entries.is_split() && !is_parity() &&
+               entries.rows().num_rows() <= 0xffffffffu;
+    }
+
+    [[nodiscard]] std::size_t plan_memory() const {
+        arena memory;
+        take_zeroed(memory);
+        (void)entries.take(memory, crossing_use());
+        return memory.used();
+    }
+    // Bytes at the start of the workspace that must be zero on entry. A finished call leaves them zero, but for the
+    // state.
+    [[nodiscard]] std::size_t zeroed_bytes() const {
+        arena memory;
+        take_zeroed(memory);
+        return memory.used();
+    }
+    void launch(arena& memory, cudaStream_t stream) const {
+        auto* const state = memory.take<pipeline_state>(1);
+        if (fb.changes != nullptr) // what the log says of the targets will not hold
+            check(cudaMemsetAsync(fb.changes, 0, core::change_log::header_words * sizeof(word), stream));
+        if constexpr (parity::is_possible) {
+            if (is_parity()) {
+                launch_parity(memory, state, stream);
+                return;
+            }
+        }
+        if constexpr (fills_bit_rows<SolidShader, framebuffer_type>) {
+            if (is_grouped()) {
+                launch_groups(memory, state, stream);
+                return;
+            }
+        }
+        const auto m = entries.take(memory);
+        const auto& limits = entries.plan.limits;
+        const auto shaders = entries.shaders(m, stream);
+        const crossing_list sorted = entries.launch(m, state, stream);
+        core::for_each_index<sizeof...(Targets)>([&]<std::size_t K>() {
+            const auto& t = voxelpipe::get<K>(fb.targets);
+            if (t.load == load_operation::clear) clear_target(t, state, limits, stream);
+        });
+        end_stage(entries.clock, &stage_times::clear);
+        fill_rows(sorted, entries.rules(), shaders, fb, state, limits, stream);
+        end_stage(entries.clock, &stage_times::tile_resolve);
+    }
+
+private:
+    using uses = typename solid_entries<draw_type>::crossing_use;
+    [[nodiscard]] uses crossing_use() const {
+        return is_parity() ? uses::toggles : is_grouped() ? uses::groups : uses::sorts;
+    }
+    // Takes the memory that zeroed_bytes() counts.
+    void take_zeroed(arena& memory) const {
+        (void)memory.take<pipeline_state>(1);
+        if (is_parity()) (void)row_marks::take(memory, entries.rows());
+        if (is_grouped()) (void)memory.take<std::uint32_t>(entries.rows().num_rows());
+    }
+    void launch_groups(arena& memory, pipeline_state* state, cudaStream_t stream) const {
+        auto* const counts = memory.take<std::uint32_t>(entries.rows().num_rows());
+        const auto m = entries.take(memory, uses::groups, counts);
+        entries.launch_groups(m, state, stream);
+        fill_bit_rows(m.by_row, m.cover.mask, entries.rules(), entries.draws[0].fragment_shader, fb, state,
+                      entries.plan.limits, stream);
+        end_stage(entries.clock, &stage_times::tile_resolve);
+    }
+    void launch_parity(arena& memory, pipeline_state* state, cudaStream_t stream) const {
+        const row_grid rows = entries.rows();
+        const row_marks marks = row_marks::take(memory, rows);
+        const auto m = entries.take(memory, uses::toggles);
+        for (const draw_type& d : entries.draws)
+            if (!d.mesh.has_checked_indices() && d.mesh.triangles.size() != 0)
+                check_indices(d.mesh.triangles.data(), d.mesh.triangles.size(), d.mesh.positions.size(), state, stream);
+        word* const bits = parity::bits(fb);
+        const auto words_x = static_cast<std::uint32_t>((rows.extent.x + 31) / 32);
+        const std::uint64_t words = rows.num_rows() * words_x;
+        zeroed_memory zeros;
+        // By the first kernel, if that does not wait for anything.
+        if (entries.shades_on_the_spot() && words % 4 == 0 && reinterpret_cast<std::uintptr_t>(bits) % 16 == 0)
+            zeros = {reinterpret_cast<uint4*>(bits), words / 4};
+        else
+            clear_target(voxelpipe::get<0>(fb.targets), state, entries.plan.limits, stream);
+        entries.emit(m, crossing_toggler{bits, marks.marked, marks.odd_behind, words_x}, zeros, state, stream);
+        end_parities(bits, marks, rows, entries.plan.options.count_voxels, state, stream);
+        end_stage(entries.clock, &stage_times::tile_resolve);
+    }
+};
+
+} // namespace voxelpipe::device
