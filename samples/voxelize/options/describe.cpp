@@ -11,6 +11,7 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -49,7 +50,8 @@ CLI::Validator between(Number low, Number high) {
         Number value{};
         if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return "";
         std::ostringstream reason;
-        reason << "a number from " << low << " to " << high << ", not \"" << text << '"';
+        reason << (std::is_integral_v<Number> ? "a whole number from " : "a number from ") << low << " to " << high
+               << ", not \"" << text << '"';
         return reason.str();
     };
     return {why_not, "", "between"};
@@ -238,7 +240,9 @@ void describe_machine(CLI::App& app, command_line& options) {
         ->check(CLI::Validator(
             [](std::string& n) {
                 const bool is_number = !n.empty() && n.size() < 5 && n.find_first_not_of("0123456789") == n.npos;
-                return n == "all" || (is_number && std::stoi(n) > 0) ? std::string() : "a number from 1 on, or all";
+                return n == "all" || (is_number && std::stoi(n) > 0)
+                           ? std::string()
+                           : "a whole number from 1 to 9999, or all, not \"" + n + '"';
             },
             "", "devices"))
         ->option_text("N|all")

@@ -43,7 +43,7 @@ void understand_batch(command_line& options, bool has_world, bool has_rank) {
                           " processes this one is");
     const auto check_rank = [&] {
         if (batch.rank >= batch.world_size)
-            throw usage_error("--rank is below --world-size: " + std::to_string(batch.rank) + " of " +
+            throw usage_error("--rank must be below --world-size: it is " + std::to_string(batch.rank) + " of " +
                               std::to_string(batch.world_size));
     };
     if (batch.list.empty()) {
