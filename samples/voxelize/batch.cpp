@@ -216,6 +216,24 @@ private:
     std::vector<job> jobs_;
 };
 
+// The models of the list FILE, "-" for standard input. Throws model_error, which names the list and the reason.
+std::vector<listed_model> models_of(const fs::path& file) {
+    const bool is_stdin = file == "-";
+    try {
+        if (is_stdin) return read_list(std::cin);
+        std::error_code ignored;
+        if (fs::is_directory(file, ignored)) throw model_error("it is a folder");
+        std::ifstream list(file);
+        if (!list.is_open()) throw model_error(std::generic_category().message(errno));
+        std::vector<listed_model> models = read_list(list);
+        if (list.bad()) throw model_error("reading it fails");
+        return models;
+    } catch (const model_error& error) {
+        throw model_error("cannot read the list " + (is_stdin ? "on standard input" : '\'' + file.string() + '\'') +
+                          ": " + error.what());
+    }
+}
+
 } // namespace
 
 std::string work_of(const command_line& options, const fs::path& model) {
@@ -294,23 +312,7 @@ fs::path manifest_folder(const fs::path& output) {
 }
 
 int run_batch(const command_line& options) {
-    std::vector<listed_model> models;
-    if (options.batch.list == "-") {
-        models = read_list(std::cin);
-    } else {
-        std::ifstream list(options.batch.list);
-        const int why_closed = list.is_open() ? 0 : errno;
-        const std::string cannot = "cannot read the list '" + options.batch.list.string() + "': ";
-        std::error_code error;
-        if (fs::is_directory(options.batch.list, error)) throw model_error(cannot + "it is a folder");
-        if (!list.is_open()) throw model_error(cannot + std::strerror(why_closed));
-        try {
-            models = read_list(list);
-        } catch (const model_error& error) {
-            throw model_error(cannot + error.what());
-        }
-        if (list.bad()) throw model_error(cannot + "reading fails");
-    }
+    const std::vector<listed_model> models = models_of(options.batch.list);
     const fs::path folder = manifest_folder(options.outputs.front());
     const manifest records(folder / ("manifest." + std::to_string(options.batch.rank) + ".jsonl"));
     const finished_models finished(folder);

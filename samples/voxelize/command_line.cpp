@@ -107,6 +107,12 @@ command_line parse_command_line(int argc, const char* const* argv) {
         const std::string name = text.substr(0, text.find(':'));
         if (text.find("At Most") == std::string::npos) throw usage_error(name + " needs a value");
         throw usage_error(why_repeated(name, app.count(name)));
+    } catch (const CLI::ConversionError& error) { // "Could not convert: OPTION = VALUE"
+        const std::string text = error.what();
+        const std::size_t colon = text.find(": "), equal = text.find(" = ");
+        if (colon == std::string::npos || equal == std::string::npos || equal < colon) throw usage_error(text);
+        throw usage_error(text.substr(colon + 2, equal - colon - 2) + " does not take \"" + text.substr(equal + 3) +
+                          '"');
     } catch (const CLI::ParseError& error) {
         throw usage_error(error.what());
     }

@@ -298,7 +298,10 @@ TEST(ToolBatch, ChecksItsOptions) {
     ::unsetenv("PMI_SIZE");
     const outcome missing = run(folder, {"--list", folder / "none.txt", "-o", folder / "{name}.npy"});
     EXPECT_EQ(missing.code, 2);
-    EXPECT_NE(missing.err.find("cannot read the list"), std::string::npos);
+    EXPECT_NE(missing.err.find("cannot read the list '"), std::string::npos);
+    EXPECT_NE(missing.err.find("': No such file or directory"), std::string::npos) << missing.err;
+    const outcome a_folder = run(folder, {"--list", folder.path().string(), "-o", folder / "{name}.npy"});
+    EXPECT_EQ("voxelize: cannot read the list '" + folder.path().string() + "': it is a folder\n", a_folder.err);
 }
 
 } // namespace

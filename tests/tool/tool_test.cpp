@@ -62,6 +62,10 @@ TEST(Tool, WrongCommandLinesAreExplained) {
     expect({model, "-o", out, "--no-such-option", "5"}, "there is no option --no-such-option");
     expect({model, model, "-o", out}, "m.glb\": one INPUT is read; --list FILE reads many");
     expect({model, "-o"}, "--output needs a value");
+    expect({model, "-o", out, "--padding", "x"}, "--padding does not take \"x\"");
+    expect({model, "-o", out, "--vote=maybe"}, "--vote does not take \"maybe\"");
+    expect({model, "-o", out, "--zoom", "0"}, "--zoom: a number above 0, not \"0\"");
+    expect({model, "-o", out, "--background", "red"}, "--background takes sky, white, dark, transparent, #rrggbb, or");
     expect({model, "-o", out, "-r", "1.5"}, "--resolution takes one whole number or three, ");
     expect({model, "-o", out, "-r", "99999999999"}, "--resolution: \"99999999999\" has a number that is too large");
     expect({model, "-o", out, "--origin", "0,0,0", "-s", "1", "--extent", "1,2.5,1"}, "three whole numbers, X,Y,Z");

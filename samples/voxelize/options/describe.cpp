@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <sstream>
@@ -55,6 +56,16 @@ CLI::Validator between(Number low, Number high) {
         return reason.str();
     };
     return {why_not, "", "between"};
+}
+
+// A number above 0.
+CLI::Validator above_zero() {
+    const auto why_not = [](const std::string& text) -> std::string {
+        double value = 0;
+        const bool is_good = CLI::detail::lexical_cast(text, value) && value > 0 && std::isfinite(value);
+        return is_good ? "" : "a number above 0, not \"" + text + '"';
+    };
+    return {why_not, "", "above_zero"};
 }
 
 void describe_files(CLI::App& app, command_line& options, raw_options& raw) {
@@ -304,7 +315,7 @@ void describe_picture(CLI::App& app, command_line& options, raw_options& raw) {
         ->option_text("DEG")
         ->group("Picture (.png)");
     app.add_option("--zoom", picture.zoom, "1 fits the model into the picture. Default: 1")
-        ->check(CLI::PositiveNumber.description(""))
+        ->check(above_zero())
         ->option_text("F")
         ->group("Picture (.png)");
     app.add_option("--fov", picture.field_of_view, "Degrees from top to bottom, 0: orthographic. Default: 28")

@@ -217,7 +217,10 @@ void understand_picture(command_line& options, const raw_options& raw) {
     }
     if (!raw.background.empty()) {
         const std::optional<background> chosen = parse_background(raw.background);
-        if (!chosen) throw usage_error("--background \"" + raw.background + "\" is not known, see --help");
+        if (!chosen)
+            throw usage_error("--background takes sky, white, dark, transparent, #rrggbb, or #rrggbb,#rrggbb from top "
+                              "to bottom, not \"" +
+                              raw.background + '"');
         picture.backdrop = *chosen;
     }
     picture.use_color = !raw.no_color;
