@@ -59,7 +59,7 @@ Assimp::IOStream* file_system::Open(const char* file, const char* mode) {
 
 std::optional<std::span<const std::byte>> file_system::find_libraries(const std::string& names) {
     const bool asks_for_stand_in =
-        last_was_missing_ && names == std::filesystem::path(name_).replace_extension("mtl").string();
+        names == std::filesystem::path(name_).replace_extension("mtl").string() && !model_names(names);
     std::vector<std::byte> joined;
     std::size_t read = 0;
     for (const std::string& name :
@@ -73,11 +73,22 @@ std::optional<std::span<const std::byte>> file_system::find_libraries(const std:
             missing_.push_back(name);
         }
     }
-    last_was_missing_ = read == 0 && !asks_for_stand_in;
     if (read == 0) return std::nullopt;
     if (asks_for_stand_in) stand_in_ = names;
     add_materials(joined);
     return libraries_.emplace_back(std::move(joined));
+}
+
+bool file_system::model_names(const std::string& libraries) const {
+    constexpr std::string_view blank = " \t\r", key = "mtllib";
+    const std::string_view text{reinterpret_cast<const char*>(bytes_.data()), bytes_.size()};
+    for (std::size_t at = text.find(key); at != std::string_view::npos; at = text.find(key, at + key.size())) {
+        std::string_view rest = text.substr(at + key.size());
+        rest = rest.substr(0, rest.find('\n'));
+        rest.remove_prefix(std::min(rest.find_first_not_of(blank), rest.size()));
+        if (rest.substr(0, rest.find_last_not_of(blank) + 1) == libraries) return true;
+    }
+    return false;
 }
 
 void file_system::add_materials(std::span<const std::byte> library) {

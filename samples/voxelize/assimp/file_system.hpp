@@ -48,6 +48,8 @@ private:
     // One or more libraries, one behind the other. assimp asks for MODEL.mtl where it gets nothing for the names in the
     // file.
     std::optional<std::span<const std::byte>> find_libraries(const std::string& names);
+    // True if a line "mtllib" of the model has these names.
+    [[nodiscard]] bool model_names(const std::string& libraries) const;
     // Remembers the names behind "newmtl".
     void add_materials(std::span<const std::byte> library);
     // The bytes of FILE, nothing where it cannot be had.
@@ -61,7 +63,6 @@ private:
     std::set<std::string> materials_;                                                       // of these
     std::vector<std::string> missing_;
     std::optional<std::string> stand_in_;
-    bool last_was_missing_ = false;
 };
 
 } // namespace voxelize::assimp
