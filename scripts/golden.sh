@@ -126,9 +126,9 @@ tool_cases() {
         printf 'solid.tool.%s model.glb out.npz -r 36 --solid %s -t occupancy,color,count\n' "$solid" "$solid"
     done
     printf 'solid.tool.inner model.glb out.npy -r 36 --solid nonzero --solid-extent inner\n'
-    printf 'solid.tool.close_holes model.stl out.npy -r 36 --solid even_odd --close-holes\n'
-    printf 'solid.tool.vote model.stl out.npy -r 36 --vote\n'
-    printf 'solid.tool.closing model.ply out.npy -r 36 --solid exterior --closing 2\n'
+    printf 'solid.tool.close_holes open.stl out.npy -r 36 --solid even_odd --close-holes\n'
+    printf 'solid.tool.vote open.stl out.npy -r 36 --solid even_odd --vote\n'
+    printf 'solid.tool.closing open.stl out.npy -r 36 --solid exterior --closing 2\n'
     for format in obj stl ply; do printf 'model.%s model.%s out.npz -r 40 -t occupancy,color,normal\n' "$format" "$format"; done
     printf 'model.voxel_size model.stl out.npy -s 0.375 --padding 2\n'
     printf 'model.exact_grid model.glb out.npy -s 0.5 --origin -4,-6,-3 --extent 17,20,11\n'
@@ -183,7 +183,7 @@ run_tool() {
     mkdir "$scratch/out"
     (cd "$scratch" && "${runner[@]}" "$tool" "$model" -o "out/$output" "$@" --compression 0 --quiet --backend "$backend" \
         --threads "$threads") >"$scratch/log.txt" 2>&1 </dev/null || {
-        problem "$name: the tool has failed: $(tail -n 1 "$scratch/log.txt")"
+        problem "$name: the tool has failed: $(sed -n 1p "$scratch/log.txt")"
         broken[$name]=1
         return 0
     }

@@ -47,31 +47,42 @@ expect() {
     fi
 }
 
+# also TEXT: that output has TEXT too.
+also() {
+    grep -qF -- "$1" output.txt && return
+    printf 'the output above has no "%s"\n' "$1"
+    failures=$((failures + 1))
+}
+# holds COMMAND...: it ends with 0.
+holds() {
+    "$@" && return
+    printf 'failed: %s\n' "$*"
+    failures=$((failures + 1))
+}
+
 expect 1 'hashes.txt is missing'
 with= expect 0 'hashes written' --update
 cp hashes.txt right.txt
 expect 0 'a.two 000000000000005a'
 # Sorted, name and hash, one a line, and nothing else on standard output.
-"$script" --build build --hashes hashes.txt 2>messages.txt >lines.txt
-grep -v '^#' hashes.txt | cmp - lines.txt || failures=$((failures + 1))
-LC_ALL=C sort -c lines.txt || failures=$((failures + 1))
-[[ $(grep -cvE '^[a-zA-Z0-9_.-]+ [0-9a-f]{16}$' lines.txt) -eq 0 ]] || failures=$((failures + 1))
+grep -v '^#' hashes.txt >lines.txt
+"$script" --build build --hashes hashes.txt --library 2>messages.txt >library.txt
+holds cmp library.txt <(grep -E '^[abc]\.' lines.txt)
+holds env LC_ALL=C sort -c lines.txt
+holds test "$(grep -cvE '^[a-zA-Z0-9_.-]+ [0-9a-f]{16}$' lines.txt)" -eq 0
 
-sed 's/^b\.one .*/b.one 0123456789abcdef/' right.txt >hashes.txt
-expect 1 'b.one: 000000000000005b differs from 0123456789abcdef'
-sed 's/^file\.npz .*/file.npz 0123456789abcdef/' right.txt >hashes.txt
-with= expect 1 'file.npz: '
-expect 0 ' 0 problems' --library
-grep -v '^c\.three' right.txt >hashes.txt
-expect 1 'c.three: '
-{
-    cat right.txt
-    echo 'z.gone 0123456789abcdef'
-} >hashes.txt
-with= expect 1 'z.gone: '
+# A hash that differs, of the library and of a file; one that is missing; and one of no case.
+sed 's/^b\.one .*/b.one 0123456789abcdef/; s/^file\.npz .*/file.npz 0123456789abcdef/; /^c\.three/d' right.txt >hashes.txt
+echo 'z.gone 0123456789abcdef' >>hashes.txt
+with= expect 1 'b.one: 000000000000005b differs from 0123456789abcdef'
+also 'file.npz: '
+also 'c.three: '
+also 'z.gone: '
+also ' 4 problems'
 cp right.txt hashes.txt
 : >hashes_empty.txt
 expect 1 'a.two: ' --hashes hashes_empty.txt
+expect 1 'no-such-file.txt is missing' --hashes no-such-file.txt
 
 expect 1 'the runner no-such-runner is not there' no-such-runner
 expect 1 'the runner ./hashes.txt is not there' ./hashes.txt
@@ -89,8 +100,8 @@ expect 1 'takes a number' --every none
 with= expect 1 'does not go with' --update --every 3
 
 # A share of the cases: every tenth one, from the first.
-"$script" --build build --hashes hashes.txt --every 10 2>/dev/null | cmp - <(awk 'NR % 10 == 1' lines.txt) ||
-    failures=$((failures + 1))
+"$script" --build build --hashes hashes.txt --every 10 2>messages.txt >share.txt || cat messages.txt
+holds cmp share.txt <(awk 'NR % 10 == 1' lines.txt)
 
 # A program that fails, whatever it has printed, is a failure with its name.
 printf 'exit 3\n' >>build/tests/golden/golden_hashes

@@ -40,9 +40,17 @@ std::string decimal(float value) {
 }
 std::string decimals(const glm::vec3& p) { return decimal(p.x) + ' ' + decimal(p.y) + ' ' + decimal(p.z); }
 
-// What the model consists of: a torus of one material and a sphere of another around its centre.
+// What the model consists of: a torus of one material, and spheres of another: one that overlaps the torus, with a
+// cavity, and one beside it that is inside out. Each rule of solids fills other voxels.
 struct model_parts {
-    mesh_data ring = torus(6, 3, 5200, 2100), ball = sphere(5, 2700, false);
+    mesh_data ring = torus(6, 3, 5200, 2100), ball = sphere(5, 3900, false);
+
+    model_parts() {
+        append(ball, sphere(3, 1900, true));
+        mesh_data drop = sphere(3, 1300, true);
+        for (glm::vec3& p : drop.positions) p += glm::vec3(5.5f, 5.0f, 4.5f);
+        append(ball, drop);
+    }
 };
 
 std::string obj_of(const model_parts& m) {
@@ -141,7 +149,7 @@ std::string glb_of(const model_parts& m) {
         number(ball_indices) +
         R"(,"material":1}]}],"materials":[{"name":"ring","pbrMetallicRoughness":{"baseColorFactor":[0.875,0.5,0.25,1]}},)"
         R"({"name":"ball","doubleSided":true,"alphaMode":"BLEND","pbrMetallicRoughness":{"baseColorFactor":)"
-        R"([0.125,0.375,0.75,0.5]}}],"buffers":[{"byteLength":)" +
+        R"([0.125,0.375,0.75,0.375]}}],"buffers":[{"byteLength":)" +
         std::to_string(binary.size()) + R"(}],"bufferViews":[)" + views + R"(],"accessors":[)" + accessors + "]}";
     json.append((4 - json.size() % 4) % 4, ' ');
     std::string file = "glTF";
@@ -252,9 +260,10 @@ int write_models(const std::string& folder) {
         mesh_data both = parts.ring;
         append(both, parts.ball);
         write(to / "model.obj", obj_of(parts));
-        write(to / "model.mtl", "newmtl ring\nKd 0.875 0.5 0.25\nnewmtl ball\nKd 0.125 0.375 0.75\nd 0.5\n");
+        write(to / "model.mtl", "newmtl ring\nKd 0.875 0.5 0.25\nnewmtl ball\nKd 0.125 0.375 0.75\nd 0.375\n");
         write(to / "model.stl", stl_of(both));
         write(to / "model.ply", ply_of(both));
+        write(to / "open.stl", stl_of(sphere(6, 7700, false, 7)));
         write(to / "model.glb", glb_of(parts));
     });
 }

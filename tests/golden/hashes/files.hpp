@@ -8,8 +8,8 @@
 
 namespace golden {
 
-// Writes model.glb, model.obj with model.mtl, model.stl and model.ply, the same bytes on every machine.
-// Returns the exit code, 1 with a message where a file cannot be written.
+// Writes model.glb, model.obj with model.mtl, model.stl and model.ply, and open.stl, which has holes: the same bytes on
+// every machine. Returns the exit code, 1 with a message where a file cannot be written.
 int write_models(const std::string& folder);
 
 // Prints `name hash` of a file, or of all files below a folder with their names, in the order of these. The content of

@@ -12,6 +12,7 @@
 #include <glm/vec4.hpp>
 
 #include <cmath>
+#include <utility>
 
 namespace golden {
 

@@ -11,6 +11,9 @@
 
 #include <glm/vec2.hpp>
 
+#include <bit>
+#include <utility>
+
 namespace golden {
 
 struct sparse_values {
