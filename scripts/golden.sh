@@ -92,6 +92,7 @@ find_program() {
     done
     die "$1 is not there: build the targets golden_hashes and voxelize, or name another build with --build"
 }
+[[ $build == /* ]] || build=$root/$build
 suffix=
 [[ $backend == cpu ]] || suffix=_cuda
 program=$(find_program "${program:-$build/tests/golden/golden_hashes$suffix}")

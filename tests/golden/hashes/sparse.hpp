@@ -129,7 +129,7 @@ void add_octree_levels(case_table<Backend>& cases, const std::string& name, cons
 template <class Backend>
 void add_nanovdb(Backend& backend, digest& d, const sparse_targets<Backend>& fb) {
     const auto host = fb.to_host(backend);
-    vp::nanovdb_file file;
+    vp::io::nanovdb_file file;
     file.add_target<0>("sums", host);
     file.add_target<1>("count", host);
     file.add_target<2>("most", host);

@@ -62,7 +62,7 @@ template <class T>
     } else if constexpr (sizeof(T) == 8) {
         return static_cast<T>(std::uint64_t{h} * 0x100000001u + (std::uint64_t{h} << 13));
     } else {
-        return static_cast<T>(h >> 7);
+        return static_cast<T>(h); // large, so that sums saturate
     }
 }
 
