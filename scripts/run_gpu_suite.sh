@@ -5,11 +5,11 @@
 # run_gpu_suite.sh [part...]: the CUDA tests on this machine's GPU, with a record under build/gpu_results/ (or where
 # VOXELPIPE_RESULTS says). A run of all parts replaces records/MACHINE/suite.txt at its end, passed or failed; MACHINE is the
 # second word of the device's name (h200). Fails without a device, and where a part cannot run. Parts, all by default:
-#   default     the equality suite, scenes included where VOXELPIPE_SCENES_DIR has them
+#   default     the equality suite and the golden hashes, scenes included where VOXELPIPE_SCENES_DIR has them
 #   fast_math   the suite without the scenes, built with -use_fast_math
 #   no_fmad     the same with --fmad=false
 #   plain_constexpr  part of it, built without --expt-relaxed-constexpr
-#   tool        the files that voxelize writes on the GPU against those that it writes on the CPU
+#   tool        the files that voxelize writes on the GPU against those that it writes on the CPU, and against golden hashes
 #   sanitizer   compute-sanitizer memcheck, racecheck, initcheck and synccheck over a reduced suite
 # VOXELPIPE_CUDA_FLAGS: further options for nvcc, which the record names; --Ofast-compile=mid halves the time to build.
 # VOXELPIPE_STEP: build, or run, for a machine that has no device but time, and one that has a device for a short time only.
@@ -108,11 +108,37 @@ build_suite() {
         -DCMAKE_CUDA_FLAGS="$* ${VOXELPIPE_CUDA_FLAGS:-}" ${CMAKE_PREFIX_PATH:+-DCMAKE_PREFIX_PATH="$CMAKE_PREFIX_PATH"} \
         $([[ -d .deps ]] && printf -- '-DCMAKE_PREFIX_PATH=%s/.deps' "$root") >"build/configure-$folder.log" 2>&1 ||
         { tail -n 40 "build/configure-$folder.log"; die "cmake could not configure $folder"; }
-    cmake --build "build/$folder" -j "$jobs" --target "${target:-device_tests}" -- -k 0 >"build/make-$folder.log" 2>&1 || {
+    cmake --build "build/$folder" -j "$jobs" --target ${target:-device_tests} -- -k 0 >"build/make-$folder.log" 2>&1 || {
         grep -E 'error|FAILED' "build/make-$folder.log" | head -n 20
         printf 'note: %s did not build completely\n' "$folder" | tee -a "$record"
         failures=$((failures + 1))
     }
+}
+
+# The golden hashes of the library on this GPU, and those of the tool's files where the tool was built: cases that are equal
+# have passed, names that the program leaves out were not run.
+run_golden() {
+    local part=$1 folder=$2 start=$SECONDS log passed failed skipped status=0 options=()
+    [[ $step != build ]] || return 0
+    [[ -z ${VOXELPIPE_PROGRAMS:-} || golden_hashes_cuda =~ $VOXELPIPE_PROGRAMS ]] || return 0
+    if [[ $step == run && ! -x build/$folder/tests/golden/golden_hashes_cuda ]]; then
+        printf '%-15s %-28s not built\n' "$part" golden_hashes_cuda | tee -a "$record"
+        not_run=$((not_run + 1))
+        return 0
+    fi
+    [[ -x build/$folder/samples/voxelize/voxelize ]] || options=(--library)
+    log="build/gpu-$part-golden_hashes_cuda.log"
+    timeout "${VOXELPIPE_PROGRAM_SECONDS:-900}" scripts/golden.sh --build "build/$folder" --backend cuda "${options[@]}" \
+        >"$log" 2>&1 || status=$?
+    read -r passed failed skipped < <(sed -nE 's/^golden hashes: ([0-9]+) equal, ([0-9]+) problems, ([0-9]+) not run$/\1 \2 \3/p' "$log") || true
+    passed=${passed:-0} failed=${failed:-0} skipped=${skipped:-0}
+    [[ $status -eq 0 || $failed -gt 0 ]] || failed=1
+    [[ $passed -gt 0 || $failed -gt 0 ]] || failed=1
+    printf '%-15s %-28s %8d %8d %8d %8d\n' "$part" golden_hashes_cuda "$passed" "$failed" "$skipped" $((SECONDS - start)) |
+        tee -a "$record"
+    failures=$((failures + failed))
+    not_run=$((not_run + skipped))
+    if [[ $failed -gt 0 ]]; then grep -vE '^[a-zA-Z0-9_.-]+ [0-9a-f]{16}$' "$log" | sed -n 1,40p; fi
 }
 
 run_suite() {
@@ -135,14 +161,17 @@ for part in "${parts[@]}"; do
         decode_scenes
         build_suite gpu
         run_suite default gpu
+        run_golden default gpu
         ;;
     fast_math)
         build_suite gpu-fast-math -use_fast_math
         run_suite fast_math gpu-fast-math
+        run_golden fast_math gpu-fast-math
         ;;
     no_fmad)
         build_suite gpu-no-fmad --fmad=false
         run_suite no_fmad gpu-no-fmad
+        run_golden no_fmad gpu-no-fmad
         ;;
     plain_constexpr)
         target=plain_constexpr_test build_suite gpu-plain-constexpr
@@ -151,6 +180,8 @@ for part in "${parts[@]}"; do
     tool)
         samples=ON target=voxelize_gpu_files_test build_suite gpu-tool
         run_program tool voxelize_gpu_files_test build/gpu-tool/tests/tool/voxelize_gpu_files_test
+        samples=ON target="golden_hashes_cuda voxelize" build_suite gpu-tool
+        run_golden tool gpu-tool
         samples=ON target=gi_gpu_test build_suite gpu-tool
         run_program tool gi_gpu_test build/gpu-tool/tests/gi/gi_gpu_test
         ;;
