@@ -197,7 +197,7 @@ for part in "${parts[@]}"; do
         sanitized_sparse+=':DeviceSparseMasks.NodesWithout*:DeviceSparseMasks.LargeTriangles*:DeviceSparseAsync.*'
         sanitized_sparse+=':DeviceSparseGoesOn.ConstantsHave*:DeviceSparseMerge.SlabsOfSeveralGpus*-*InPartsOfLargeGrids'
         sanitized_solids='Solids.EveryRuleBodyAndExtentIntoBits:Solids.RowsOfManyCrossings:Solids.Async:Solids.ExteriorAndVote'
-        sanitized_solids+=':Solids.SlabsOfA*:Solids.ClosedHoles:DeviceRepairs.HolesAndVotes:DeviceRepairs.ListsAndSparseResults'
+        sanitized_solids+=':Solids.VotesOf*:Solids.SlabsOfA*:Solids.ClosedHoles:DeviceRepairs.HolesAndVotes:DeviceRepairs.ListsAndSparseResults'
         sanitized=(small_loads small_lists counting_sort fragment_order fragment_sort immediate immediate_bits kept_graphs tracked_changes
             sparse solids devices)
         target="$(printf 'device_%s_test ' "${sanitized[@]}")" build_suite gpu
