@@ -5,7 +5,9 @@
 
     record.py MACHINE RESULTS_FOLDER    copies what a benchmark has written to records/MACHINE, replaces the matching sections
                                         of its README.md, and appends the times of whole calls to records/history.csv
-    record.py --check                   fails if a table under records/ is not in the history, or names no commit
+    record.py --check                   fails if a table under records/ is not in the history, or names no commit; if a suite.txt has
+                                        failures; and if a note of a README.md on suite.txt, solids.csv or programs.csv is not of the
+                                        commit that the file is of
 
 MACHINE is a folder's name: h200, h100, xeon, epyc. Needs the standard library only.
 """
@@ -122,6 +124,27 @@ def record(machine, results):
     print(f"records/{machine}: {', '.join(changed)} of {commit}; {len(times)} lines added to records/history.csv")
 
 
+def stale_notes(readme):
+    """What is wrong with the suite of a machine and with notes that quote a file which is replaced as a whole."""
+    folder, errors = readme.parent, []
+    parts = sections(readme.read_text(encoding="utf-8"))
+    notes = parts.get(NOTES, "")
+    suite = folder / "suite.txt"
+    if suite.exists():
+        text = suite.read_text(encoding="utf-8")
+        failures, commit = re.search(r"^failures: (\d+)$", text, flags=re.M), re.search(r"^commit: (\w+)", text, flags=re.M)
+        if not failures or not commit or failures.group(1) != "0":
+            errors.append(f"{folder.name}/suite.txt has failures, or does not say that it has none and of which commit it is")
+        elif not re.search(rf"^- `suite\.txt` has .* of {commit.group(1)}[.;,]", notes, flags=re.M):
+            errors.append(f"{folder.name}/README.md: no note says that suite.txt is of {commit.group(1)}")
+    for subject, name in (("Solids", "solids.csv"), ("Programs", "programs.csv")):
+        named = [body for title, body in parts.items() if name in title.split(", ")]
+        for note in re.findall(rf"^- {subject}\b(.*)", notes, flags=re.M) if named else []:
+            if not note.startswith(f" at {commit_of(named[0])}"):
+                errors.append(f"{folder.name}/README.md: the note on {subject.lower()} is not of {commit_of(named[0])}, as {name} is")
+    return errors
+
+
 def check():
     history = read(HISTORY)
     errors = [] if history and list(history[0]) == HISTORY_COLUMNS else ["history.csv: other columns than expected"]
@@ -137,6 +160,8 @@ def check():
             lost = [cell for cell, ms in times_of(read(path)) if (commit, machine, cell, ms) not in known]
             if lost:
                 errors.append(f"history.csv lacks {len(lost)} figures of {machine}/table.csv at {commit}, first {lost[0]}")
+    for readme in sorted(ROOT.glob("*/README.md")):
+        errors += stale_notes(readme)
     for line in errors:
         print(f"error: {line}", file=sys.stderr)
     return 1 if errors else 0

@@ -98,7 +98,8 @@ std::string describe_device(const clock_watch& watch) {
            std::to_string(p.multiProcessorCount) + " multiprocessors, " + std::to_string(p.totalGlobalMem >> 20) +
            " MiB, L2 " + std::to_string(p.l2CacheSize >> 20) + " MiB\n- driver: " + watch.driver() + " (CUDA " +
            version(driver) + "), CUDA runtime " + version(runtime) +
-           ", compiled by nvcc " VOXELPIPE_NVCC_VERSION " for architectures " VOXELPIPE_CUDA_ARCHITECTURES "\n";
+           ", compiled by nvcc " VOXELPIPE_NVCC_VERSION " " VOXELPIPE_NVCC_OPTIONS
+           " for architectures " VOXELPIPE_CUDA_ARCHITECTURES "\n";
 }
 
 } // namespace bench::gpu

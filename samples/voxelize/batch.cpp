@@ -30,10 +30,12 @@
 #include <map>
 #include <set>
 #include <stdexcept>
+#include <string_view>
 #include <system_error>
 #include <thread>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 
 namespace voxelize {
 namespace {
@@ -214,6 +216,24 @@ private:
     std::vector<job> jobs_;
 };
 
+// The models of the list FILE, "-" for standard input. Throws model_error, which names the list and the reason.
+std::vector<listed_model> models_of(const fs::path& file) {
+    const bool is_stdin = file == "-";
+    try {
+        if (is_stdin) return read_list(std::cin);
+        std::error_code ignored;
+        if (fs::is_directory(file, ignored)) throw model_error("it is a folder");
+        std::ifstream list(file);
+        if (!list.is_open()) throw model_error(std::generic_category().message(errno));
+        std::vector<listed_model> models = read_list(list);
+        if (list.bad()) throw model_error("reading it fails");
+        return models;
+    } catch (const model_error& error) {
+        throw model_error("cannot read the list " + (is_stdin ? "on standard input" : '\'' + file.string() + '\'') +
+                          ": " + error.what());
+    }
+}
+
 } // namespace
 
 std::string work_of(const command_line& options, const fs::path& model) {
@@ -243,11 +263,19 @@ std::string work_of(const command_line& options, const fs::path& model) {
 }
 
 std::vector<listed_model> read_list(std::istream& list) {
+    constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF", blank = " \t\r";
     std::vector<listed_model> models;
     std::unordered_set<std::string> stems;
+    bool is_first = true;
     for (std::string line; std::getline(list, line);) {
-        if (!line.empty() && line.back() == '\r') line.pop_back();
-        if (line.empty() || line[0] == '#') continue;
+        if (std::exchange(is_first, false)) {
+            if (line.starts_with("\xFE\xFF") || line.starts_with("\xFF\xFE"))
+                throw model_error("it is text in UTF-16, not UTF-8");
+            if (line.starts_with(byte_order_mark)) line.erase(0, byte_order_mark.size());
+        }
+        const std::size_t start = line.find_first_not_of(blank);
+        if (start == std::string::npos || line[start] == '#') continue;
+        line = line.substr(start, line.find_last_not_of(blank) + 1 - start);
         models.push_back({line, fs::path(line).stem().string()});
         stems.insert(models.back().name);
     }
@@ -284,15 +312,7 @@ fs::path manifest_folder(const fs::path& output) {
 }
 
 int run_batch(const command_line& options) {
-    std::vector<listed_model> models;
-    if (options.batch.list == "-") {
-        models = read_list(std::cin);
-    } else {
-        std::ifstream list(options.batch.list);
-        models = read_list(list);
-        if (list.bad() || (!list.is_open()))
-            throw model_error("cannot read the list '" + options.batch.list.string() + "'");
-    }
+    const std::vector<listed_model> models = models_of(options.batch.list);
     const fs::path folder = manifest_folder(options.outputs.front());
     const manifest records(folder / ("manifest." + std::to_string(options.batch.rank) + ".jsonl"));
     const finished_models finished(folder);

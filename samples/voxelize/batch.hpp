@@ -20,8 +20,9 @@ struct listed_model {
     std::string name;
 };
 
-// The models of a list, one a line; blank lines and those that begin with '#' are none. A name is the file's without
-// its extension. Where it was taken before, it gets -2, -3, ..., the first that no model of the list has.
+// The models of a list, one a line, in UTF-8. A byte order mark, blanks around paths, blank lines and lines that begin
+// with '#' are passed over. A name is the file's without its extension. Where it was taken before, it gets -2, -3, ...,
+// the first that no model of the list has. Throws model_error with the bare reason for text in UTF-16.
 [[nodiscard]] std::vector<listed_model> read_list(std::istream& list);
 
 // A name that two runs share if they do the same work on a model: it stands for every option that can change a byte,

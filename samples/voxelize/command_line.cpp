@@ -66,6 +66,12 @@ std::vector<std::string> arguments(int argc, const char* const* argv) {
     return list;
 }
 
+// OPTION, by its first name, was given TIMES times and takes one value.
+std::string why_repeated(const std::string& option, std::size_t times) {
+    return option + (times == 2 ? " is given twice" : " is given " + std::to_string(times) + " times") +
+           "; it takes one value";
+}
+
 // WORDS of the command line are neither options nor their values.
 std::string why_unexpected(const std::vector<std::string>& words) {
     const auto option =
@@ -97,14 +103,22 @@ command_line parse_command_line(int argc, const char* const* argv) {
         throw usage_error(why_unexpected(app.remaining()));
     } catch (const CLI::ArgumentMismatch& error) {
         const std::string text = error.what();
-        throw usage_error(
-            text.find(" required ") == std::string::npos ? text : text.substr(0, text.find(':')) + " needs a value");
+        if (text.find(" required ") == std::string::npos) throw usage_error(text);
+        const std::string name = text.substr(0, text.find(':'));
+        if (text.find("At Most") == std::string::npos) throw usage_error(name + " needs a value");
+        throw usage_error(why_repeated(name, app.count(name)));
+    } catch (const CLI::ConversionError& error) { // "Could not convert: OPTION = VALUE"
+        const std::string text = error.what();
+        const std::size_t colon = text.find(": "), equal = text.find(" = ");
+        if (colon == std::string::npos || equal == std::string::npos || equal < colon) throw usage_error(text);
+        throw usage_error(text.substr(colon + 2, equal - colon - 2) + " does not take \"" + text.substr(equal + 3) +
+                          '"');
     } catch (const CLI::ParseError& error) {
         throw usage_error(error.what());
     }
     // Ranges let NaN through.
-    if (!std::isfinite(options.load.scale)) throw usage_error("--scale is a number");
-    if (!std::isfinite(options.load.gltf.seconds)) throw usage_error("--time is a number of seconds");
+    if (!std::isfinite(options.load.scale)) throw usage_error("--scale takes a finite number");
+    if (!std::isfinite(options.load.gltf.seconds)) throw usage_error("--time takes a finite number of seconds");
     for (const CLI::Option* const option : app.get_options()) {
         const std::string group = option->get_group();
         if (option->count() == 0 || group == "Many models, many processes" || group == "Machine" || group == "Messages")

@@ -149,7 +149,8 @@ std::vector<std::byte> run_isolated(const std::function<std::vector<std::byte>()
     close(ends[0]);
     if (!complete) kill(child, SIGKILL);
     int status = 0;
-    while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    rusage used{};
+    while (wait4(child, &status, 0, &used) < 0 && errno == EINTR) {
     }
     if (no_memory) throw std::bad_alloc();
     if (!complete)
@@ -157,6 +158,9 @@ std::vector<std::byte> run_isolated(const std::function<std::vector<std::byte>()
                           " that a file of this size gets");
     if (WIFSIGNALED(status)) {
         const int signal = WTERMSIG(status);
+        const auto seconds = static_cast<std::uint64_t>(used.ru_utime.tv_sec + used.ru_stime.tv_sec) + 1;
+        if (signal == SIGKILL && seconds < limits.seconds)
+            throw model_error(who + " was killed on this file, as the kernel does where memory runs out");
         if (signal == SIGXCPU || signal == SIGKILL)
             throw model_error(who + " needs more than the " + std::to_string(limits.seconds) +
                               " s that a file of this size gets");

@@ -75,7 +75,13 @@ void for_each_line(const fs::path& file, const std::string& key, const Visit& vi
 void add_obj_files(const fs::path& model, std::vector<fs::path>& files) {
     const fs::path folder = model.parent_path();
     for_each_line(model, "mtllib", [&](const std::string& name) {
-        if (const auto path = assimp::local_file(name)) files.push_back(folder / *path);
+        const auto is_there = [&](const std::string& file) {
+            std::error_code error;
+            const auto path = assimp::local_file(file);
+            return path && fs::is_regular_file(folder / *path, error);
+        };
+        for (const std::string& library : assimp::material_libraries(name, is_there))
+            if (const auto path = assimp::local_file(library)) files.push_back(folder / *path);
     });
     const std::size_t libraries = files.size();
     // A picture's name follows options, and may have blanks; it lies where it says, or beside the model.

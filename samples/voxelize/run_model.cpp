@@ -224,6 +224,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
         write_options how = options.write;
         bar.start("writing " + output.filename().string());
         how.progress = [&bar](double done) { bar.show(done); };
+        how.warn = [&report](const std::string& warning) { report.warnings.push_back(warning); };
         for (std::filesystem::path& file :
              storage.sparse ? write_output(bricks, options, output, how) : write_output(voxels, options, output, how))
             report.files.push_back(std::move(file));

@@ -93,10 +93,16 @@ cudaError_t cudaDeviceGetAttribute(int* value, cudaDeviceAttr attribute, int) {
     return cudaSuccess;
 }
 
+// What memory holds that nobody has written: a byte, given as a number.
+static int fill_byte() {
+    const char* const wanted = std::getenv("VOXELPIPE_EMULATION_FILL");
+    return wanted != nullptr ? static_cast<int>(std::strtol(wanted, nullptr, 0)) : 0xcd;
+}
 cudaError_t cudaMalloc(void** p, std::size_t bytes) {
+    static const int fill = fill_byte();
     *p = std::aligned_alloc(256, (bytes + 255) / 256 * 256);
     if (*p == nullptr) return cudaErrorMemoryAllocation;
-    std::memset(*p, 0xcd, bytes);
+    std::memset(*p, fill, bytes);
     return cudaSuccess;
 }
 cudaError_t cudaFree(void* p) {

@@ -10,37 +10,12 @@
 // A case runs once with 1 thread and once with several; `threads` is that number. After a deliberate change of bits,
 // VOXELPIPE_UPDATE_GOLDEN=1 golden_test rewrites golden.txt, and the difference is reviewed like code.
 
-#include <cstddef>
-#include <cstdint>
-#include <span>
+#include "digest.hpp"
+
 #include <string>
-#include <type_traits>
 #include <vector>
 
 namespace golden {
-
-// 64-bit FNV-1a over the raw bytes and the lengths of everything that is added.
-class digest {
-public:
-    template <class T>
-    void add(const std::vector<T>& values) {
-        static_assert(std::is_trivially_copyable_v<T>);
-        add_bytes(std::as_bytes(std::span(values)));
-    }
-    void add(std::uint64_t value) { add_bytes(std::as_bytes(std::span(&value, 1))); }
-
-    [[nodiscard]] std::uint64_t value() const { return hash_; }
-
-private:
-    void add_bytes(std::span<const std::byte> bytes) {
-        std::uint64_t length = bytes.size();
-        for (int i = 0; i < 8; ++i, length >>= 8) mix(static_cast<std::uint8_t>(length & 0xff));
-        for (const std::byte b : bytes) mix(static_cast<std::uint8_t>(b));
-    }
-    void mix(std::uint8_t byte) { hash_ = (hash_ ^ byte) * 0x100000001b3u; }
-
-    std::uint64_t hash_ = 0xcbf29ce484222325u;
-};
 
 struct golden_case {
     std::string name;

@@ -245,6 +245,19 @@ TEST(Solids, ExteriorAndVote) {
     one.expect_same(box_grid({130, 41, 43}), {.repair = vp::repair::exterior, .closing = 35});
 }
 
+// A block takes as many triangles as it has threads, and several blocks share those of a small mesh.
+TEST(Solids, VotesOfMoreTrianglesThanABlockHasThreads) {
+    const mesh_data all = tied_bodies(36.0f, 300, 11);
+    for (const std::size_t count : {std::size_t{255}, std::size_t{256}, std::size_t{257}, all.triangles.size()}) {
+        SCOPED_TRACE(count);
+        ASSERT_GE(all.triangles.size(), count);
+        mesh_data m = all;
+        m.triangles.resize(count);
+        const drawing_of_bits bits{{m}, {{}}, {{true}}};
+        bits.expect_same(box_grid({37, 26, 25}), {.repair = vp::repair::vote});
+    }
+}
+
 // A slab takes what the rest of the grid has decided (solid_options::slab): as on the CPU, and as the whole's layers.
 struct layers {
     int begin, end;

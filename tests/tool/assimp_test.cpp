@@ -189,6 +189,54 @@ TEST(Obj, ATextureThatCannotBeHadIsAWarning) {
         with({{"wood.tga", bytes_of("\x01\x02")}}));
 }
 
+// A square of two materials, A and B, behind LIBRARIES.
+std::string two_materials(const std::string& libraries) {
+    return libraries + "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n";
+}
+
+glm::vec4 color_of(const scene& scene, const std::string& name) {
+    for (const voxelize::material& entry : scene.materials)
+        if (entry.name == name) return entry.base_color;
+    ADD_FAILURE() << "no material " << name;
+    return {};
+}
+
+TEST(Obj, SeveralLibrariesAreRead) {
+    const glm::vec4 red(1, 0, 0, 1), green(0, 1, 0, 1);
+    const files others{{"red.mtl", bytes_of("newmtl a\nKd 1 0 0")},
+                       {"my greens.MTL", bytes_of("newmtl b\nKd 0 1 0\n")},
+                       {"plain", bytes_of("newmtl b\nKd 0 1 0\n")}};
+    for (const char* const libraries : {"mtllib red.mtl my greens.MTL\n", "mtllib my greens.MTL  red.mtl\r\n",
+                                        "mtllib red.mtl\nmtllib my greens.MTL\n", "mtllib red.mtl\nmtllib plain\n"}) {
+        const scene scene = load("m.obj", two_materials(libraries), others);
+        EXPECT_EQ("", text_of(scene.warnings)) << libraries;
+        EXPECT_EQ(red, color_of(scene, "a")) << libraries;
+        EXPECT_EQ(green, color_of(scene, "b")) << libraries;
+    }
+}
+
+TEST(Obj, AMessageNamesTheLibraryThatCannotBeRead) {
+    const auto warnings = [](const std::string& libraries, const files& others) {
+        return text_of(load("m.obj", two_materials(libraries), others).warnings);
+    };
+    const std::vector<std::byte> a = bytes_of("newmtl a\nKd 1 0 0\n");
+    const std::string start = "the material library ";
+    EXPECT_EQ(start + "\"gone.mtl\" cannot be read: surfaces of its materials are white\n",
+              warnings("mtllib red.mtl gone.mtl\n", {{"red.mtl", a}}));
+    EXPECT_EQ(start + "\"gone.mtl\" cannot be read: surfaces of its materials are white\n",
+              warnings("mtllib gone.mtl\nmtllib red.mtl\n", {{"red.mtl", a}}));
+    EXPECT_EQ(start + "\"one.mtl\" cannot be read: surfaces are white\n" + start +
+                  "\"two.mtl\" cannot be read: surfaces are white\n",
+              warnings("mtllib one.mtl two.mtl\n", {}));
+    EXPECT_EQ(start + "\"m.mtl\" cannot be read: surfaces are white\n", warnings("mtllib m.mtl\n", {}));
+    // assimp's choice where nothing that is named is there.
+    EXPECT_EQ(start + "\"gone.mtl\" cannot be read: \"m.mtl\" is read in its place\n",
+              warnings("mtllib gone.mtl\n", {{"m.mtl", a}}));
+    const scene scene = load("m.obj", two_materials("mtllib red.mtl gone.mtl\n"), {{"red.mtl", a}});
+    EXPECT_EQ(glm::vec4(1, 0, 0, 1), color_of(scene, "a"));
+    EXPECT_EQ(glm::vec4(1), color_of(scene, "b"));
+}
+
 TEST(Obj, FilesOutsideTheFolderAreNotRead) {
     std::vector<std::string> asked;
     const auto reader = [&](const std::filesystem::path& path, std::uint64_t) -> std::vector<std::byte> {

@@ -55,6 +55,15 @@ TEST(GltfMalformed, NotAGltf) {
     }());
 }
 
+TEST(GltfMalformed, AFileThatCannotBeLookedAtSaysWhy) {
+    try {
+        (void)voxelize::load_gltf(std::filesystem::path(testing::TempDir()) / (std::string(300, 'a') + ".glb"));
+        ADD_FAILURE() << "no error";
+    } catch (const voxelize::gltf_error& error) {
+        EXPECT_STREQ("cannot be read: File name too long", error.what()); // it may well be there
+    }
+}
+
 TEST(GltfMalformed, EveryPrefixOfAGlbIsRefused) {
     builder file;
     file.triangle();

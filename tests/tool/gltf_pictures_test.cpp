@@ -6,6 +6,13 @@
 #include <gltf_scene.hpp>
 
 #include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
 
 using gltf_test::builder;
 using gltf_test::json;
@@ -145,9 +152,124 @@ TEST(GltfPictures, AWebpOfImpossibleSizeIsRefused) {
         bomb.push_back(static_cast<std::byte>(byte));
     for (std::size_t i = 5; i < 8; ++i) bomb[i] = std::byte{0};
     const scene scene = load(with_texture({{"source", 0}}, json::array({{{"uri", uri("webp", bomb)}}})));
-    EXPECT_EQ("images[0] cannot be used: its 16384 x 16384 pixels cannot come from 32 bytes; the colour factor is used "
-              "alone\n",
-              text_of(scene.warnings));
+    EXPECT_EQ(
+        "images[0] cannot be used: its 16384 x 16384 pixels are too large: at most 16785408 are read from a WebP of "
+        "32 bytes; the colour factor is used alone\n",
+        text_of(scene.warnings));
+}
+
+// What is said of one picture, without what is done in its place.
+std::string reason_against(const std::vector<std::byte>& picture) {
+    const scene scene = load(with_texture({{"source", 0}}, json::array({{{"uri", uri("png", picture)}}})));
+    if (scene.warnings.empty()) return "";
+    const std::string before = "images[0] cannot be used: ", behind = "; the colour factor is used alone";
+    const std::string& line = scene.warnings.front();
+    EXPECT_EQ(1U, scene.warnings.size());
+    EXPECT_TRUE(line.starts_with(before) && line.ends_with(behind)) << line;
+    return line.substr(before.size(), line.size() - before.size() - behind.size());
+}
+
+// Writes NUMBER into COUNT bytes from AT on, the high one first.
+void put(std::vector<std::byte>& bytes, std::size_t at, std::uint32_t number, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) bytes[at + i] = static_cast<std::byte>(number >> 8 * (count - 1 - i));
+}
+
+// A PNG whose rows are all 0, of BITS for each pixel of one channel, compressed as far as deflate goes.
+std::vector<std::byte> black_png(std::uint32_t width, std::uint32_t height, std::uint32_t bits) {
+    const std::vector<Bytef> raw(std::size_t{height} * (1 + (std::size_t{width} * bits + 7) / 8));
+    uLongf size = compressBound(raw.size());
+    std::vector<Bytef> data(size);
+    EXPECT_EQ(Z_OK, compress2(data.data(), &size, raw.data(), raw.size(), 9));
+    std::vector<std::byte> file = gltf_test::bytes_of("\x89PNG\r\n\x1a\n");
+    const auto chunk = [&file](const char* type, const std::vector<std::byte>& content) {
+        const std::size_t at = file.size();
+        file.resize(at + 12 + content.size()); // the checksum stays 0: it is not read
+        put(file, at, static_cast<std::uint32_t>(content.size()), 4);
+        std::memcpy(file.data() + at + 4, type, 4);
+        std::copy(content.begin(), content.end(), file.begin() + static_cast<std::ptrdiff_t>(at) + 8);
+    };
+    std::vector<std::byte> header(13);
+    put(header, 0, width, 4);
+    put(header, 4, height, 4);
+    put(header, 8, bits, 1);
+    chunk("IHDR", header);
+    std::vector<std::byte> stream(size);
+    std::memcpy(stream.data(), data.data(), size);
+    chunk("IDAT", stream);
+    chunk("IEND", {});
+    return file;
+}
+
+// The start of a JPEG: its frame, of three channels.
+std::vector<std::byte> jpeg_frame(std::uint32_t width, std::uint32_t height, int kind = 0xC0, int depth = 8) {
+    std::vector<std::byte> file;
+    for (const int byte : {0xFF, 0xD8, 0xFF, 0xE0, 0, 4, 1,    1, 0xFF, kind, 0, 17,   depth, 0, 0, 0,
+                           0,    3,    1,    0x11, 0, 2, 0x11, 0, 3,    0x11, 0, 0xFF, 0xDA,  0, 12})
+        file.push_back(static_cast<std::byte>(byte));
+    put(file, 13, height, 2);
+    put(file, 15, width, 2);
+    return file;
+}
+
+TEST(GltfPictures, OneThatIsTooLargeSaysItsSizeAndTheLimit) {
+    std::vector<std::byte> png = gltf_test::png(1, 1, {1, 2, 3, 4});
+    put(png, 16, 20000, 4);
+    EXPECT_EQ("its 20000 x 1 pixels are too large: at most 16384 a side are read", reason_against(png));
+    EXPECT_EQ("its 8 x 40000 pixels are too large: at most 16384 a side are read",
+              reason_against(jpeg_frame(8, 40000)));
+    EXPECT_EQ("its 16000 x 16000 pixels cannot come from 31 bytes", reason_against(jpeg_frame(16000, 16000)));
+}
+
+TEST(GltfPictures, AGreyPngThatDeflateHoldsIsRead) {
+    const std::vector<std::byte> grey = black_png(8192, 3072, 8);
+    EXPECT_LT(grey.size(),
+              8192U * 3072 * 4 / 3072); // the bound of old refused more than 64 MiB and 1024 times the file
+    EXPECT_EQ("", reason_against(grey));
+    EXPECT_EQ("", reason_against(black_png(1000, 700, 1)));
+}
+
+// 16 bytes of compressed data hold at most 16512 bytes of rows: 3302 of one pixel and its filter.
+TEST(GltfPictures, APngOfMoreThanDeflateHoldsIsRefused) {
+    std::vector<std::byte> png = gltf_test::png(1, 1, {1, 2, 3, 4});
+    put(png, 20, 3303, 4);
+    EXPECT_EQ("its 1 x 3303 pixels cannot come from 16 bytes of compressed data", reason_against(png));
+    put(png, 20, 3302, 4);
+    EXPECT_EQ("it cannot be decoded (damaged PNG: not enough pixels)", reason_against(png));
+    put(png, 28, 1, 1); // interlaced: the pixels of a column come in four passes, with the same rows
+    EXPECT_EQ("it cannot be decoded (damaged PNG: not enough pixels)", reason_against(png));
+    put(png, 20, 3303, 4);
+    EXPECT_EQ("its 1 x 3303 pixels cannot come from 16 bytes of compressed data", reason_against(png));
+}
+
+TEST(GltfPictures, EveryDamageHasAReason) {
+    const std::vector<std::byte> whole = gltf_test::png(2, 2, std::vector<std::uint8_t>(16, 200));
+    const auto check = [](const std::vector<std::byte>& picture, std::size_t at) {
+        const std::string reason = reason_against(picture);
+        EXPECT_EQ(std::string::npos, reason.find("()")) << at << ": " << reason;
+        EXPECT_EQ(std::string::npos, reason.find("unknown")) << at << ": " << reason;
+        EXPECT_NE("it cannot be decoded", reason) << at;
+        return reason;
+    };
+    for (std::size_t size = 8; size + 8 < whole.size(); ++size) {
+        const std::string reason = check({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)}, size);
+        EXPECT_EQ(0U, reason.find("the PNG is cut short")) << reason;
+    }
+    for (std::size_t at = 8; at < whole.size(); ++at)
+        for (const int value : {0, 65, 255}) {
+            std::vector<std::byte> damaged = whole;
+            damaged[at] = static_cast<std::byte>(value);
+            check(damaged, at);
+        }
+    std::vector<std::byte> strange = whole;
+    put(strange, 37, 0, 4); // the type of the chunk IDAT
+    EXPECT_EQ("the PNG has a chunk \"????\", which is not known and not optional", check(strange, 37));
+
+    EXPECT_EQ("the JPEG is cut short: it has no frame", reason_against(gltf_test::bytes_of("\xFF\xD8\xFF")));
+    EXPECT_EQ("it is a JPEG of a kind that is not supported: lossless, hierarchical or arithmetic",
+              reason_against(jpeg_frame(8, 8, 0xC9)));
+    EXPECT_EQ("it is a JPEG of 12 bits a channel, and only 8 are supported",
+              reason_against(jpeg_frame(8, 8, 0xC1, 12)));
+    EXPECT_EQ(0U, reason_against(jpeg_frame(8, 8)).find("it cannot be decoded (damaged JPEG: "));
 }
 
 TEST(GltfPictures, AFormatThatIsRefusedIsNamed) {

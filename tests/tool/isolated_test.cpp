@@ -66,6 +66,14 @@ TEST(Isolated, ACrashIsAnError) {
     EXPECT_EQ("it broke down on this file", error_of([]() -> std::vector<std::byte> { _exit(0); }));
 }
 
+TEST(Isolated, OneThatIsKilledEarlyDidNotTakeTooLong) {
+    EXPECT_EQ("it was killed on this file, as the kernel does where memory runs out",
+              error_of([]() -> std::vector<std::byte> {
+                  raise(SIGKILL);
+                  return {};
+              }));
+}
+
 TEST(Isolated, EndlessWorkIsEnded) {
     voxelize::isolation_limits limits;
     limits.seconds = 1;

@@ -67,6 +67,21 @@ TEST(NamedFiles, LibrariesAndPicturesOfObj) {
               (std::vector<fs::path>{files.begin(), files.begin() + 2}));
 }
 
+TEST(NamedFiles, SeveralLibrariesOfALine) {
+    const scratch_folder folder;
+    write(folder / "m.obj", "mtllib one.mtl my two.mtl gone.mtl\n");
+    write(folder / "one.mtl", "newmtl a\n");
+    write(folder / "my two.mtl", "newmtl b\nmap_Kd wood.png\n");
+    write(folder / "wood.png", "0");
+    EXPECT_EQ(
+        (std::vector<fs::path>{folder.path() / "one.mtl", folder.path() / "my two.mtl", folder.path() / "gone.mtl",
+                               folder.path() / "wood.png", folder.path() / "wood.png"}),
+        voxelize::named_files(folder / "m.obj"));
+    write(folder / "one.mtl my two.mtl gone.mtl", "newmtl c\n"); // the whole, where there is such a file
+    EXPECT_EQ(std::vector<fs::path>{folder.path() / "one.mtl my two.mtl gone.mtl"},
+              voxelize::named_files(folder / "m.obj"));
+}
+
 TEST(NamedFiles, NoneOfWhatIsNoModel) {
     const scratch_folder folder;
     for (const char* const name : {"m.gltf", "m.glb", "m.obj", "m.stl"}) {

@@ -59,6 +59,30 @@ TEST(ToolBatch, NamesAreStemsAndEqualOnesAreNumbered) {
     EXPECT_EQ(voxelize::manifest_folder("{name}.npy"), "");
 }
 
+TEST(ToolBatch, AByteOrderMarkAndBlanksAroundPathsArePassedOver) {
+    std::istringstream list("\xEF\xBB\xBF"
+                            "a b.obj\r\n \t c.obj \t\r\n \t\r\n  # no model\n\td e.obj\n#f.obj");
+    std::vector<std::string> inputs;
+    for (const auto& m : voxelize::read_list(list)) inputs.push_back(m.input.string());
+    EXPECT_EQ((std::vector<std::string>{"a b.obj", "c.obj", "d e.obj"}), inputs);
+
+    models all;
+    all.add("one.obj");
+    all.add("two.obj", 2);
+    std::ofstream(all.folder / "models.txt") << "\xEF\xBB\xBF" << all.inputs[0] << " \r\n\t" << all.inputs[1] << "\r\n";
+    const outcome result = all.run_list();
+    EXPECT_EQ(0, result.code) << result.err;
+    EXPECT_TRUE(fs::exists(all.folder / "out/one.npy"));
+    EXPECT_TRUE(fs::exists(all.folder / "out/two.npy"));
+
+    std::ofstream(all.folder / "models.txt") << "\xFF\xFE"
+                                             << "a";
+    const outcome wide = all.run_list();
+    EXPECT_EQ(2, wide.code);
+    EXPECT_EQ("voxelize: cannot read the list '" + (all.folder / "models.txt") + "': it is text in UTF-16, not UTF-8\n",
+              wide.err);
+}
+
 TEST(ToolBatch, EachModelIsWhatARunByItselfGives) {
     models all;
     for (int i = 0; i < 7; ++i) all.add("m/part" + std::to_string(i) + ".obj", 1.0f + static_cast<float>(i));
@@ -274,7 +298,10 @@ TEST(ToolBatch, ChecksItsOptions) {
     ::unsetenv("PMI_SIZE");
     const outcome missing = run(folder, {"--list", folder / "none.txt", "-o", folder / "{name}.npy"});
     EXPECT_EQ(missing.code, 2);
-    EXPECT_NE(missing.err.find("cannot read the list"), std::string::npos);
+    EXPECT_NE(missing.err.find("cannot read the list '"), std::string::npos);
+    EXPECT_NE(missing.err.find("': No such file or directory"), std::string::npos) << missing.err;
+    const outcome a_folder = run(folder, {"--list", folder.path().string(), "-o", folder / "{name}.npy"});
+    EXPECT_EQ("voxelize: cannot read the list '" + folder.path().string() + "': it is a folder\n", a_folder.err);
 }
 
 } // namespace

@@ -39,6 +39,30 @@ TEST(Messages, ChoicesAreListedInWords) {
     EXPECT_EQ("voxelize: --stats takes text or json, not \"xml\"", error({"--stats=xml"}));
 }
 
+TEST(Messages, AnOptionOfOneValueThatIsGivenTwiceSaysSo) {
+    const scratch_folder folder;
+    const auto error = [&](const std::vector<std::string>& how) {
+        const outcome result = run_world(folder, how);
+        EXPECT_EQ(1, result.code);
+        return result.err.substr(0, result.err.find('\n'));
+    };
+    const std::vector<std::pair<std::string, std::string>> options{
+        {"--resolution", "8"},    {"--padding", "1"},     {"--voxel-size", "1"},       {"--origin", "0,0,0"},
+        {"--extent", "4,4,4"},    {"--scale", "2"},       {"--coverage", "thin"},      {"--alpha", "cutoff"},
+        {"--depth-axis", "x"},    {"--solid", "nonzero"}, {"--solid-extent", "outer"}, {"--closing", "1"},
+        {"--fill-color", "mean"}, {"--backend", "cpu"},   {"--strategy", "tiled"},     {"--devices", "1"},
+        {"--threads", "1"},       {"--max-memory", "99"}, {"--work-memory", "99"},     {"--image-size", "9x9"},
+        {"--azimuth", "1"},       {"--zoom", "1"},        {"--background", "sky"},     {"--up", "y"},
+        {"--compression", "1"},   {"--stats", "json"},    {"--zarr-codec", "gzip"},    {"--list", "l.txt"}};
+    for (const auto& [option, value] : options)
+        EXPECT_EQ("voxelize: " + option + " is given twice; it takes one value", error({option, value, option, value}));
+    EXPECT_EQ("voxelize: --resolution is given twice; it takes one value", error({"-r", "8", "-r", "16"}));
+    EXPECT_EQ("voxelize: --resolution is given 3 times; it takes one value",
+              error({"-r", "8", "--resolution=16", "-r", "9"}));
+    EXPECT_EQ("voxelize: --resolution needs a value", error({"-r", "8", "-r"}));
+    EXPECT_EQ("voxelize: --output needs a value", error({"-o", folder / "p.npy", "-o"}));
+}
+
 TEST(Messages, ResolutionTakesThreeNumbers) {
     const scratch_folder folder;
     const auto extent = [&](const std::vector<std::string>& how) {

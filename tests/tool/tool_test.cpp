@@ -62,9 +62,21 @@ TEST(Tool, WrongCommandLinesAreExplained) {
     expect({model, "-o", out, "--no-such-option", "5"}, "there is no option --no-such-option");
     expect({model, model, "-o", out}, "m.glb\": one INPUT is read; --list FILE reads many");
     expect({model, "-o"}, "--output needs a value");
-    expect({model, "-o", out, "--max-memory", "lots"}, "--max-memory: a number from 1 to 1073741824, not \"lots\"");
+    expect({model, "-o", out, "--padding", "x"}, "--padding does not take \"x\"");
+    expect({model, "-o", out, "--vote=maybe"}, "--vote does not take \"maybe\"");
+    expect({model, "-o", out, "--zoom", "0"}, "--zoom: a number above 0, not \"0\"");
+    expect({model, "-o", out, "--background", "red"}, "--background takes sky, white, dark, transparent, #rrggbb, or");
+    expect({model, "-o", out, "-r", "1.5"}, "--resolution takes one whole number or three, ");
+    expect({model, "-o", out, "-r", "99999999999"}, "--resolution: \"99999999999\" has a number that is too large");
+    expect({model, "-o", out, "--origin", "0,0,0", "-s", "1", "--extent", "1,2.5,1"}, "three whole numbers, X,Y,Z");
+    expect({model, "-o", out, "--threads", "1.5"}, "--threads: a whole number from 0 to 1024, not \"1.5\"");
+    expect({model, "-o", out, "--devices", "0"}, "--devices: a whole number from 1 to 9999, or all, not \"0\"");
+    expect({model, "-o", out, "--world-size", "2", "--rank", "2"}, "--rank must be below --world-size: it is 2 of 2");
+    expect({model, "-o", out, "--animation", "0", "--time", "inf"}, "--time takes a finite number of seconds");
+    expect({model, "-o", out, "--max-memory", "lots"},
+           "--max-memory: a whole number from 1 to 1073741824, not \"lots\"");
     expect({model, "-o", out, "--scale", "nan"}, "--scale: a number from 1e-30 to 1e+30, not \"nan\"");
-    expect({model, "-o", out, "-r", "8x8"}, "one number or three, X,Y,Z or XxYxZ, not \"8x8\"");
+    expect({model, "-o", out, "-r", "8x8"}, "one whole number or three, X,Y,Z or XxYxZ, not \"8x8\"");
 }
 
 TEST(Tool, ModelsThatCannotBeUsedEndWithTwo) {

@@ -5,10 +5,9 @@
 #include "../finite.hpp"
 #include "../gltf/text.hpp"
 #include "file_name.hpp"
+#include "file_system.hpp"
 #include "linear_color.hpp"
 
-#include <assimp/IOStream.hpp>
-#include <assimp/IOSystem.hpp>
 #include <assimp/Importer.hpp>
 #include <assimp/config.h>
 #include <assimp/material.h>
@@ -26,9 +25,6 @@ namespace voxelize::assimp {
 
 namespace {
 
-// ---- Files: the model itself from memory, others through the reader, none outside the model's folder
-// -----------------
-
 // Faults that assimp finds too late.
 void check_text(std::span<const std::byte> bytes, const std::string& extension) {
     const std::string_view text{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -38,88 +34,6 @@ void check_text(std::span<const std::byte> bytes, const std::string& extension) 
     if (extension == ".ply" && text.find("end_header") == std::string_view::npos)
         throw std::runtime_error("the PLY header has no end_header");
 }
-
-class memory_stream : public Assimp::IOStream {
-public:
-    // ends_line: a line's end follows the bytes.
-    memory_stream(std::span<const std::byte> bytes, bool ends_line)
-        : bytes_{bytes}, size_{bytes.size() + (ends_line ? 1 : 0)} {}
-
-    std::size_t Read(void* buffer, std::size_t size, std::size_t count) override {
-        if (size == 0) return 0;
-        count = std::min(count, (size_ - at_) / size);
-        const std::size_t end = at_ + count * size, last = std::min(end, bytes_.size());
-        if (last > at_) std::memcpy(buffer, bytes_.data() + at_, last - at_);
-        if (end > std::max(last, at_)) static_cast<char*>(buffer)[end - at_ - 1] = '\n';
-        at_ = end;
-        return count;
-    }
-    std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
-    aiReturn Seek(std::size_t offset, aiOrigin origin) override {
-        const std::size_t base = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? at_ : size_;
-        const std::size_t target = base + offset; // may wrap: a negative offset
-        if (target > size_) return aiReturn_FAILURE;
-        at_ = target;
-        return aiReturn_SUCCESS;
-    }
-    std::size_t Tell() const override { return at_; }
-    std::size_t FileSize() const override { return size_; }
-    void Flush() override {}
-
-private:
-    std::span<const std::byte> bytes_;
-    std::size_t size_;
-    std::size_t at_ = 0;
-};
-
-class file_system : public Assimp::IOSystem {
-public:
-    file_system(std::span<const std::byte> bytes, std::string name, const gltf_file_reader& read_file)
-        : name_{std::move(name)}, bytes_{bytes}, read_file_{read_file} {}
-
-    bool Exists(const char* file) const override { return find(file).has_value(); }
-    char getOsSeparator() const override { return '/'; }
-    Assimp::IOStream* Open(const char* file, const char* mode) override {
-        if (mode != nullptr && std::strpbrk(mode, "wa+") != nullptr) return nullptr;
-        const auto found = find(file);
-        if (!found) return nullptr;
-        // assimp drops the last line of an OBJ of more than 16 MiB if it has no end.
-        const bool lacks_end = !found->empty() && found->back() != std::byte{'\n'};
-        return new memory_stream(*found, file == name_ && lower_extension(name_) == ".obj" && lacks_end);
-    }
-    void Close(Assimp::IOStream* stream) override { delete stream; }
-
-    // The material libraries that were asked for: all of them are missing, and this is the first.
-    [[nodiscard]] std::optional<std::string> missing_materials() const {
-        std::optional<std::string> first;
-        for (const auto& [path, bytes] : others_) {
-            if (lower_extension(path) != ".mtl") continue;
-            if (bytes) return std::nullopt;
-            if (!first) first = path.generic_string();
-        }
-        return first;
-    }
-
-private:
-    std::optional<std::span<const std::byte>> find(const std::string& file) const {
-        if (file == name_) return bytes_;
-        const std::optional<std::filesystem::path> path = local_file(file);
-        if (!path) return std::nullopt;
-        const auto known = others_.find(*path);
-        if (known != others_.end()) return known->second;
-        try {
-            if (read_file_) return others_.emplace(*path, read_file_(*path, UINT64_MAX)).first->second;
-        } catch (const model_error&) {
-        }
-        others_.emplace(*path, std::nullopt);
-        return std::nullopt;
-    }
-
-    std::string name_;
-    std::span<const std::byte> bytes_;
-    const gltf_file_reader& read_file_;
-    mutable std::map<std::filesystem::path, std::optional<std::vector<std::byte>>> others_; // nothing: not there
-};
 
 // ---- Materials
 // -------------------------------------------------------------------------------------------------------
@@ -281,6 +195,25 @@ void read_nodes(model& result, const aiNode& root, const std::vector<std::vector
     }
 }
 
+// Without its library a material of an OBJ is only a name, and assimp's grey.
+void warn_of_libraries(model& result, const aiScene& scene, const file_system& files) {
+    const std::vector<std::string>& missing = files.missing_libraries();
+    if (missing.empty()) return;
+    bool any_is_known = false;
+    for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
+        aiString name;
+        const bool is_known =
+            scene.mMaterials[i]->Get(AI_MATKEY_NAME, name) == aiReturn_SUCCESS && files.has_material(name.C_Str());
+        any_is_known = any_is_known || is_known;
+        if (!is_known) result.materials[i].base_color = glm::vec4(1);
+    }
+    for (const std::string& library : missing)
+        result.warnings.push_back("the material library " + gltf::in_quotes(library) + " cannot be read: " +
+                                  (files.stand_in() ? gltf::in_quotes(*files.stand_in()) + " is read in its place"
+                                   : any_is_known   ? "surfaces of its materials are white"
+                                                    : "surfaces are white"));
+}
+
 // Collada's importer turns the file's units into metres.
 void warn_of_units(model& result, const aiNode& root, const std::string& extension) {
     if (extension != ".dae" && extension != ".zae") return;
@@ -312,12 +245,7 @@ model read_model(std::span<const std::byte> bytes, const std::string& name, cons
     model result;
     for (unsigned i = 0; i < scene->mNumMaterials; ++i) add_material(result, *scene->mMaterials[i], *scene);
     for (unsigned i = 0; i < scene->mNumTextures; ++i) add_embedded(result, *scene->mTextures[i]);
-    // Without its library a material of an OBJ is only a name, and assimp's grey.
-    if (const std::optional<std::string> missing = files->missing_materials()) {
-        result.warnings.push_back("the material library " + gltf::in_quotes(*missing) +
-                                  " cannot be read: surfaces are white");
-        for (material& entry : result.materials) entry.base_color = glm::vec4(1);
-    }
+    warn_of_libraries(result, *scene, *files);
     left_out without;
     std::vector<std::vector<std::uint32_t>> primitives_of(scene->mNumMeshes); // by mesh
     for (unsigned i = 0; i < scene->mNumMeshes; ++i)

@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <functional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -33,6 +34,9 @@ struct write_options {
     std::uint64_t faces_per_file = 0;     // .ply, .obj, .glb: most faces in a file; 0: what the format can number
     preview_options preview;              // camera and light of .png
     std::function<void(double)> progress; // called with 0..1 now and then, from the calling thread; may be empty
+    // Called with a line that names the file, where it is written but readers of its format do not show all of it; from
+    // the calling thread; may be empty.
+    std::function<void(const std::string&)> warn;
 };
 
 // The facts of a format that --help shows and that are checked before the tool starts to compute.

@@ -22,7 +22,8 @@ namespace {
 using int3 = std::array<std::int64_t, 3>;
 
 constexpr std::int64_t max_side = 256;
-constexpr std::size_t palette_entries = 255; // index 0 means empty
+constexpr std::int64_t scene_low = -1000, scene_high = 999; // coordinates of MagicaVoxel's scene
+constexpr std::size_t palette_entries = 255;                // index 0 means empty
 
 // Contents of the small chunks, collected in memory; integers are 32 bits, little end first.
 class chunk_bytes {
@@ -174,6 +175,38 @@ void write_model(output_file& out, const voxel_shape& v, const block& b, const a
         [&](std::size_t, const std::vector<std::byte>& layer) { out.write(layer); });
 }
 
+// The coordinate of the file that stands on the scene's origin: the middle of the grid, and its lowest layer.
+int3 scene_origin(const voxel_shape& v, const axes& to_file) {
+    const int3 whole = to_file.size(v.extent);
+    return {whole[0] / 2, whole[1] / 2, 0};
+}
+
+// Says where models that the scene graph places lie beyond MagicaVoxel's scene; empty where none does.
+std::string beyond_scene(const voxel_shape& v, const std::vector<block>& blocks, const axes& to_file) {
+    const int3 origin = scene_origin(v, to_file);
+    int3 low{}, high{};
+    std::size_t beyond = 0;
+    for (std::size_t n = 0; n < blocks.size(); ++n) {
+        const int3 corner = to_file.low(blocks[n].low, blocks[n].size), size = to_file.size(blocks[n].size);
+        bool is_within = true;
+        for (std::size_t a = 0; a < 3; ++a) {
+            const std::int64_t first = corner[a] - origin[a], last = first + size[a] - 1;
+            low[a] = n == 0 ? first : std::min(low[a], first);
+            high[a] = n == 0 ? last : std::max(high[a], last);
+            is_within = is_within && first >= scene_low && last <= scene_high;
+        }
+        beyond += is_within ? 0 : 1;
+    }
+    if (beyond == 0) return "";
+    const auto point = [](const int3& p) {
+        return '(' + std::to_string(p[0]) + ", " + std::to_string(p[1]) + ", " + std::to_string(p[2]) + ')';
+    };
+    return std::to_string(beyond) + " of " + std::to_string(blocks.size()) +
+           " models lie in part or whole beyond MagicaVoxel's scene, which has the coordinates " +
+           std::to_string(scene_low) + " to " + std::to_string(scene_high) + ": they reach from " + point(low) +
+           " to " + point(high) + "; take fewer voxels";
+}
+
 // Root transform 0 -> group 1 -> for model n: transform 2 + 2n -> shape 3 + 2n. A transform carries the model's centre,
 // floor(size / 2), to its position.
 std::vector<std::pair<std::string_view, chunk_bytes>>
@@ -201,8 +234,7 @@ scene_graph(const voxel_shape& v, const std::vector<block>& blocks, const axes& 
     for (std::size_t n = 0; n < blocks.size(); ++n) group.integer(static_cast<std::int64_t>(2 + 2 * n));
     chunks.emplace_back("nGRP", std::move(group));
 
-    const int3 whole = to_file.size(v.extent);
-    const int3 origin{whole[0] / 2, whole[1] / 2, 0};
+    const int3 origin = scene_origin(v, to_file);
     for (std::size_t n = 0; n < blocks.size(); ++n) {
         const auto node = static_cast<std::int64_t>(2 + 2 * n);
         const int3 low = to_file.low(blocks[n].low, blocks[n].size);
@@ -261,6 +293,9 @@ std::vector<std::filesystem::path> write_vox(const voxel_shape& v, const std::fi
     }
     write_chunk(out, "RGBA", rgba);
     out.commit();
+    if (!single && options.warn)
+        if (const std::string warning = beyond_scene(v, blocks, to_file); !warning.empty())
+            options.warn("'" + path.string() + "': " + warning);
     return {path};
 }
 

@@ -10,6 +10,7 @@
 // A model is at most 256 voxels a side. What fits is one model in a version 150 file, which every reader knows. A
 // larger grid becomes blocks of 256, each that is not empty a model, placed by a scene graph of transform, group and
 // shape nodes in a version 200 file. The middle of the grid stands on the origin, its lowest layer on the ground.
+// MagicaVoxel's scene has the coordinates -1000 to 999: write_options::warn hears of models beyond.
 //
 // Colours come from the "color" channel (u8, three or four components, alpha unused) through a palette of 255; without
 // one, all voxels are clay.

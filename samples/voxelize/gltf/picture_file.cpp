@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "picture_file.hpp"
 
+#include "picture_header.hpp"
 #include "stb_memory.hpp"
 #include "text.hpp"
 
@@ -58,36 +59,29 @@ std::string reason_against(std::span<const std::byte> bytes) {
     return "it is neither PNG, JPEG nor WebP";
 }
 
-// A picture may take 64 MiB, or 1024 times its encoded size, whichever is more: deflate cannot do better on channels of
-// 8 bits. Colour values of less than a byte can, and are no loss.
-void check_size(std::uint64_t width, std::uint64_t height, std::uint64_t encoded_bytes, const gltf_limits& limits) {
-    const std::string size = std::to_string(width) + " x " + std::to_string(height);
-    const std::uint32_t side = limits.max_image_side;
-    if (width > side || height > side)
-        throw gltf_error("its " + size + " pixels are more than " + std::to_string(side) + " a side");
-    const std::uint64_t allowed = (std::uint64_t{64} << 20) + 1024 * encoded_bytes;
-    if (width * height * 4 > allowed)
-        throw gltf_error("its " + size + " pixels cannot come from " + std::to_string(encoded_bytes) + " bytes");
+// stb_image's reason in words that name what is damaged, whatever it says and if it says nothing.
+gltf_error not_decodable(const char* kind) {
+    const char* const given = stbi_failure_reason();
+    const std::string reason = given != nullptr ? printable(given) : "";
+    return gltf_error("it cannot be decoded (damaged " + std::string(kind) + (reason.empty() ? "" : ": " + reason) +
+                      ')');
 }
 
-picture decode_by_stb(std::span<const std::byte> bytes, const gltf_limits& limits) {
+picture decode_by_stb(std::span<const std::byte> bytes, const char* kind) {
     const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
     const int size = static_cast<int>(bytes.size());
-    const auto reason = [] { return printable(stbi_failure_reason() != nullptr ? stbi_failure_reason() : "unknown"); };
     int width = 0;
     int height = 0;
     int channels = 0;
-    if (stbi_info_from_memory(data, size, &width, &height, &channels) == 0 || width < 1 || height < 1)
-        throw gltf_error("it cannot be decoded (" + reason() + ")");
-    check_size(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), bytes.size(), limits);
     struct free_pixels {
         void operator()(stbi_uc* pixels) const { stbi_image_free(pixels); }
     };
     stb_ran_out_of_memory = false;
+    forget_stb_failure(); // of another picture
     const std::unique_ptr<stbi_uc, free_pixels> decoded{
         stbi_load_from_memory(data, size, &width, &height, &channels, 4)};
     if (!decoded && stb_ran_out_of_memory) throw std::bad_alloc{};
-    if (!decoded) throw gltf_error("it cannot be decoded (" + reason() + ")");
+    if (!decoded || width < 1 || height < 1) throw not_decodable(kind);
     picture result;
     result.width = static_cast<std::uint32_t>(width);
     result.height = static_cast<std::uint32_t>(height);
@@ -96,13 +90,25 @@ picture decode_by_stb(std::span<const std::byte> bytes, const gltf_limits& limit
 }
 
 #ifdef VOXELIZE_HAS_WEBP
+// A picture may take 64 MiB, or 1024 times its encoded size, whichever is more. WebP has no such bound of its own: a
+// lossless one of a single colour takes no bits for its pixels.
+void check_webp_size(std::uint64_t width, std::uint64_t height, std::uint64_t encoded_bytes,
+                     const gltf_limits& limits) {
+    check_sides(width, height, limits);
+    const std::uint64_t allowed = (std::uint64_t{64} << 20) + 1024 * encoded_bytes;
+    if (width * height * 4 > allowed)
+        throw gltf_error("its " + std::to_string(width) + " x " + std::to_string(height) +
+                         " pixels are too large: at most " + std::to_string(allowed / 4) + " are read from a WebP of " +
+                         std::to_string(encoded_bytes) + " bytes");
+}
+
 picture decode_webp(std::span<const std::byte> bytes, const gltf_limits& limits) {
     const auto* data = reinterpret_cast<const std::uint8_t*>(bytes.data());
     int width = 0;
     int height = 0;
     if (WebPGetInfo(data, bytes.size(), &width, &height) == 0 || width < 1 || height < 1)
-        throw gltf_error("it cannot be decoded (not a WebP picture)");
-    check_size(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), bytes.size(), limits);
+        throw gltf_error("it cannot be decoded (damaged WebP: no header with its size)");
+    check_webp_size(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), bytes.size(), limits);
     picture result;
     result.width = static_cast<std::uint32_t>(width);
     result.height = static_cast<std::uint32_t>(height);
@@ -120,11 +126,15 @@ picture decode_webp(std::span<const std::byte>, const gltf_limits&) {
 } // namespace
 
 picture decode_picture(std::span<const std::byte> bytes, const gltf_limits& limits) {
+    if (bytes.empty()) throw gltf_error("it is empty");
     if (bytes.size() > INT32_MAX) throw gltf_error("it is larger than 2 GiB");
     switch (format_of(bytes)) {
     case picture_format::png:
+        check_png(bytes, limits);
+        return decode_by_stb(bytes, "PNG");
     case picture_format::jpeg:
-        return decode_by_stb(bytes, limits);
+        check_jpeg(bytes, limits);
+        return decode_by_stb(bytes, "JPEG");
     case picture_format::webp:
         return decode_webp(bytes, limits);
     case picture_format::other:

@@ -12,7 +12,8 @@
 namespace voxelize::gltf {
 
 // The picture in BYTES, without a name. Throws gltf_error with the bare reason: a format that is not supported is named
-// (KTX2, AVIF, ...), a size that the bytes cannot hold is refused before memory is taken.
+// (KTX2, AVIF, ...), a size that is
+// too large or that the bytes cannot hold is refused before memory is taken.
 [[nodiscard]] picture decode_picture(std::span<const std::byte> bytes, const gltf_limits& limits);
 
 } // namespace voxelize::gltf

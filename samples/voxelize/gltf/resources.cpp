@@ -7,6 +7,7 @@
 
 #include <tiny_gltf.h>
 
+#include <cerrno>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
@@ -157,7 +158,8 @@ gltf_file_reader folder_reader(std::filesystem::path folder) {
 std::size_t checked_file_size(const std::filesystem::path& file, std::uint64_t max_bytes) {
     std::error_code error;
     const std::filesystem::file_status status = std::filesystem::status(file, error);
-    if (!std::filesystem::exists(status)) throw gltf_error("no such file");
+    if (status.type() == std::filesystem::file_type::not_found) throw gltf_error("no such file");
+    if (!std::filesystem::exists(status)) throw gltf_error("cannot be read: " + error.message());
     if (!std::filesystem::is_regular_file(status)) throw gltf_error("not a regular file");
     const std::uintmax_t size = std::filesystem::file_size(file, error);
     if (error) throw gltf_error("cannot be read: " + error.message());
@@ -171,8 +173,11 @@ std::vector<std::byte> read_whole_file(const std::filesystem::path& file, std::u
     const std::size_t size = checked_file_size(file, max_bytes);
     std::ifstream stream(file, std::ios::binary);
     std::vector<std::byte> bytes(size);
+    const int why_closed = stream.is_open() ? 0 : errno;
     if (!stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size)) && size != 0)
-        throw gltf_error("cannot be read");
+        throw gltf_error("cannot be read: " + (why_closed != 0 ? std::generic_category().message(why_closed)
+                                                               : "it ends after " + std::to_string(stream.gcount()) +
+                                                                     " of its " + std::to_string(size) + " bytes"));
     return bytes;
 }
 

@@ -31,3 +31,5 @@ static void* resized_block(void* block, std::size_t old_size, std::size_t new_si
 
 #include <stb_image.h>
 #include <tiny_gltf.h>
+
+void voxelize::gltf::forget_stb_failure() { stbi__g_failure_reason = nullptr; }

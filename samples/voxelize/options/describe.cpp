@@ -7,10 +7,12 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <sstream>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -49,10 +51,21 @@ CLI::Validator between(Number low, Number high) {
         Number value{};
         if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return "";
         std::ostringstream reason;
-        reason << "a number from " << low << " to " << high << ", not \"" << text << '"';
+        reason << (std::is_integral_v<Number> ? "a whole number from " : "a number from ") << low << " to " << high
+               << ", not \"" << text << '"';
         return reason.str();
     };
     return {why_not, "", "between"};
+}
+
+// A number above 0.
+CLI::Validator above_zero() {
+    const auto why_not = [](const std::string& text) -> std::string {
+        double value = 0;
+        const bool is_good = CLI::detail::lexical_cast(text, value) && value > 0 && std::isfinite(value);
+        return is_good ? "" : "a number above 0, not \"" + text + '"';
+    };
+    return {why_not, "", "above_zero"};
 }
 
 void describe_files(CLI::App& app, command_line& options, raw_options& raw) {
@@ -238,7 +251,9 @@ void describe_machine(CLI::App& app, command_line& options) {
         ->check(CLI::Validator(
             [](std::string& n) {
                 const bool is_number = !n.empty() && n.size() < 5 && n.find_first_not_of("0123456789") == n.npos;
-                return n == "all" || (is_number && std::stoi(n) > 0) ? std::string() : "a number from 1 on, or all";
+                return n == "all" || (is_number && std::stoi(n) > 0)
+                           ? std::string()
+                           : "a whole number from 1 to 9999, or all, not \"" + n + '"';
             },
             "", "devices"))
         ->option_text("N|all")
@@ -300,7 +315,7 @@ void describe_picture(CLI::App& app, command_line& options, raw_options& raw) {
         ->option_text("DEG")
         ->group("Picture (.png)");
     app.add_option("--zoom", picture.zoom, "1 fits the model into the picture. Default: 1")
-        ->check(CLI::PositiveNumber.description(""))
+        ->check(above_zero())
         ->option_text("F")
         ->group("Picture (.png)");
     app.add_option("--fov", picture.field_of_view, "Degrees from top to bottom, 0: orthographic. Default: 28")

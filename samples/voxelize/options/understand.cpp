@@ -43,7 +43,7 @@ void understand_batch(command_line& options, bool has_world, bool has_rank) {
                           " processes this one is");
     const auto check_rank = [&] {
         if (batch.rank >= batch.world_size)
-            throw usage_error("--rank is below --world-size: " + std::to_string(batch.rank) + " of " +
+            throw usage_error("--rank must be below --world-size: it is " + std::to_string(batch.rank) + " of " +
                               std::to_string(batch.world_size));
     };
     if (batch.list.empty()) {
@@ -217,7 +217,10 @@ void understand_picture(command_line& options, const raw_options& raw) {
     }
     if (!raw.background.empty()) {
         const std::optional<background> chosen = parse_background(raw.background);
-        if (!chosen) throw usage_error("--background \"" + raw.background + "\" is not known, see --help");
+        if (!chosen)
+            throw usage_error("--background takes sky, white, dark, transparent, #rrggbb, or #rrggbb,#rrggbb from top "
+                              "to bottom, not \"" +
+                              raw.background + '"');
         picture.backdrop = *chosen;
     }
     picture.use_color = !raw.no_color;

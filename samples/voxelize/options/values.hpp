@@ -24,11 +24,15 @@ template <class Number>
     std::vector<Number> numbers;
     const char* at = text.data();
     const char* const end = at + text.size();
+    constexpr bool is_whole = std::is_integral_v<Number>;
     while (true) {
         Number number{};
         const auto [next, error] = std::from_chars(at, end, number);
         bool good = error == std::errc{} && (next == end || *next == ',' || *next == 'x');
-        if constexpr (std::is_floating_point_v<Number>) good = good && std::isfinite(number);
+        if (error == std::errc::result_out_of_range)
+            throw usage_error(option + ": \"" + text + "\" has a number that is " +
+                              (is_whole ? "too large" : "too large or too close to 0"));
+        if constexpr (!is_whole) good = good && std::isfinite(number);
         if (!good) break;
         numbers.push_back(number);
         if (next == end) {
@@ -37,9 +41,11 @@ template <class Number>
         }
         at = next + 1;
     }
-    throw usage_error(option + " takes " +
-                      (least == 3 ? "three numbers, X,Y,Z" : "one number or three, X,Y,Z or XxYxZ") + ", not \"" +
-                      text + '"');
+    const std::string whole = is_whole ? "whole " : "";
+    throw usage_error(
+        option + " takes " +
+        (least == 3 ? "three " + whole + "numbers, X,Y,Z" : "one " + whole + "number or three, X,Y,Z or XxYxZ") +
+        ", not \"" + text + '"');
 }
 
 // One member of every entry, with commas between.

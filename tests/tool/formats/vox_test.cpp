@@ -335,3 +335,29 @@ TEST(Palette, OfNothingIsEmpty) {
     EXPECT_TRUE(p.entries.empty());
     EXPECT_TRUE(p.entry_of.empty());
 }
+
+// MagicaVoxel shows the coordinates -1000 to 999. The middle of x and y, and the lowest z, stand at 0.
+TEST_F(Vox, ModelsBeyondTheSceneAreAWarning) {
+    const auto warnings = [&](const point& extent) {
+        volume v = make_volume(extent);
+        channel& bits = v.add("occupancy", scalar::bit);
+        v.set_bit(bits, 0, 0, 0);
+        v.set_bit(bits, extent[0] - 1, extent[1] - 1, extent[2] - 1);
+        std::vector<std::string> lines;
+        write_options options;
+        options.up = up_axis::z;
+        options.warn = [&](const std::string& line) { lines.push_back(line); };
+        write(v, folder_ / "a.vox", options);
+        return lines;
+    };
+    EXPECT_TRUE(warnings({2000, 1, 1}).empty());
+    EXPECT_TRUE(warnings({1, 2000, 1}).empty());
+    EXPECT_TRUE(warnings({1, 1, 1000}).empty());
+    EXPECT_EQ(1U, warnings({1, 2001, 1}).size());
+    EXPECT_EQ(1U, warnings({1, 1, 1001}).size());
+    EXPECT_EQ(std::vector<std::string>{"'" + (folder_ / "a.vox").string() +
+                                       "': 1 of 2 models lie in part or whole beyond MagicaVoxel's scene, which has "
+                                       "the coordinates -1000 to 999: they reach from (-1000, 0, 0) to (1000, 0, 0); "
+                                       "take fewer voxels"},
+              warnings({2001, 1, 1}));
+}

@@ -203,8 +203,8 @@ void note_clears(const change_tracking<framebuffer_view<Targets...>>& tracking, 
                  const capacities& limits, cudaStream_t stream) {
     constexpr std::size_t count = sizeof...(Targets);
     if (!tracking.changes_known) return;
-    known_targets<count> after;
-    std::copy_n(tracking.after, count, after.of);
+    known_targets<count> after{};
+    for (std::size_t k = 0; k < count; ++k) after.of[k] = tracking.after[k];
     const chunk_marks marks = tracking.marks();
     note_known(tracking.log, after, marks, wipes, state, limits, stream);
 }

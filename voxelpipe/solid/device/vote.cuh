@@ -4,6 +4,7 @@
 
 // repair::vote: the parity of crossings along x, y and z at every voxel, and what most of the closed rows say.
 
+#include <voxelpipe/device/base/block_scan.cuh>
 #include <voxelpipe/solid/device/bit_sweeps.cuh>
 #include <voxelpipe/solid/device/emit_crossings.cuh>
 #include <voxelpipe/solid/solid.hpp>
@@ -37,44 +38,86 @@ struct parity_masks {
     }
 };
 
-// Changes the bit of the first voxel behind each crossing along an axis, and that of its row. A warp takes a triangle,
-// a lane every 32nd line of its rows. Along x triangles and crossings are counted. is_slab: the box is a slab along z,
-// whose columns begin with the parity below it, and are known to be open or not (solid_options::slab).
+// A triangle of a block, and its lines: those of the rows along one axis that have the same second coordinate v.
+struct voting_triangle {
+    core::snapped_position p[3];
+    std::int32_t u_lo, u_hi, v_lo;
+};
+// The triangles of a block. Their lines are numbered through, and each thread takes every so many of them: most
+// triangles have one or two, and a few of a room's walls have a thousand.
+struct voting_triangles {
+    block_scan<std::uint32_t, threads_per_block> scan;
+    std::uint32_t first_line[threads_per_block];
+    voting_triangle triangle[threads_per_block];
+
+    // The triangle that has a line: the last one that begins at it or before. Triangles without lines begin where the
+    // next one does.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE unsigned of_line(std::uint32_t line) const {
+        unsigned t = 0;
+        for (unsigned step = threads_per_block / 2; step > 0; step /= 2)
+            if (first_line[t + step] <= line) t += step;
+        return t;
+    }
+};
+
+// Changes the bit of the first voxel behind each crossing along an axis, and that of its row. A block takes as many
+// triangles as it has threads, and divides their lines; `shares` blocks take the same triangles. Along x triangles and
+// crossings are counted. is_slab: the box is a slab along z, whose columns begin with the parity below it, and are
+// known to be open or not (solid_options::slab).
 template <int Axis, class State>
 __global__ __launch_bounds__(threads_per_block,
                              2) void toggle_along_kernel(const __grid_constant__ stored_triangles source,
                                                          std::uint32_t first_triangle, std::uint32_t num_triangles,
-                                                         const __grid_constant__ row_grid grid,
+                                                         unsigned shares, const __grid_constant__ row_grid grid,
                                                          const __grid_constant__ bit_box box, bool is_slab,
                                                          word* inside, word* open, State* state) {
     using core::triangle_class;
-    const std::uint32_t lane = threadIdx.x % 32;
+    __shared__ voting_triangles all;
     const core::voxel_box whole = grid.whole_box();
-    unsigned long long crossings = 0, classes[num_triangle_classes] = {};
-    const std::uint64_t warps = std::uint64_t{gridDim.x} * (threads_per_block / 32);
-    for (std::uint64_t i = std::uint64_t{blockIdx.x} * (threads_per_block / 32) + warp_in_block(); i < num_triangles;
-         i += warps) {
-        const auto at = source.locate(first_triangle + static_cast<std::uint32_t>(i));
+    const unsigned share = blockIdx.x % shares;
+    row_totals totals;
+    // The number of the thread's triangle's lines; 0 where it has none to take.
+    const auto lines_of = [&](std::uint32_t i) -> std::uint32_t {
+        const auto at = source.locate(first_triangle + i);
         if (!at.index_ok) {
-            if (lane == 0) atomicOr(&state->index_error, bad_index);
-            continue;
+            atomicOr(&state->index_error, bad_index);
+            return 0;
         }
         const core::snapped_position p[3] = {source.exact(at, at.index.x), source.exact(at, at.index.y),
                                              source.exact(at, at.index.z)};
         const triangle_class kind = core::classify_for_rows(p[0], p[1], p[2], grid.fraction, whole, true);
-        if (lane == 0) ++classes[static_cast<int>(kind)];
-        if (kind != triangle_class::drawn) continue;
+        if (share == 0) totals.see(kind);
+        if (kind != triangle_class::drawn) return 0;
         if constexpr (Axis == 2) // crossings below the slab are in its parities
-            if (is_slab && core::bounds(p[0], p[1], p[2], grid.fraction).hi[2] < 0) continue;
+            if (is_slab && core::bounds(p[0], p[1], p[2], grid.fraction).hi[2] < 0) return 0;
         const core::row_box rows = core::rows_within<Axis>(p[0], p[1], p[2], grid.fraction, whole);
-        for (std::int64_t v = rows.v.lo + lane; v <= rows.v.hi; v += 32)
+        if (rows.empty()) return 0;
+        all.triangle[threadIdx.x] = {{p[0], p[1], p[2]},
+                                     static_cast<std::int32_t>(rows.u.lo),
+                                     static_cast<std::int32_t>(rows.u.hi),
+                                     static_cast<std::int32_t>(rows.v.lo)};
+        return static_cast<std::uint32_t>(rows.v.hi - rows.v.lo + 1);
+    };
+    const std::uint64_t step = std::uint64_t{gridDim.x / shares} * threads_per_block;
+    for (std::uint64_t first = std::uint64_t{blockIdx.x / shares} * threads_per_block; first < num_triangles;
+         first += step) {
+        const std::uint64_t i = first + threadIdx.x;
+        const std::uint32_t mine = i < num_triangles ? lines_of(static_cast<std::uint32_t>(i)) : 0;
+        all.first_line[threadIdx.x] = all.scan.sum_before(mine);
+        const std::uint32_t lines = all.scan.sum();
+        __syncthreads();
+        for (std::uint32_t line = share * threads_per_block + threadIdx.x; line < lines;
+             line += shares * threads_per_block) {
+            const unsigned k = all.of_line(line);
+            const voting_triangle& t = all.triangle[k];
+            const std::int64_t v = t.v_lo + static_cast<std::int64_t>(line - all.first_line[k]);
             core::for_each_crossing<Axis, core::centre_offset<>>(
-                p[0], p[1], p[2], grid.fraction, {rows.u, {v, v}},
-                [&](std::int64_t u, std::int64_t, std::int64_t first, int) {
-                    ++crossings;
-                    if (Axis == 2 && is_slab && first < 0) return;
+                t.p[0], t.p[1], t.p[2], grid.fraction, {{t.u_lo, t.u_hi}, {v, v}},
+                [&](std::int64_t u, std::int64_t, std::int64_t behind, int) {
+                    ++totals.crossings;
+                    if (Axis == 2 && is_slab && behind < 0) return;
                     const int n = Axis == 0 ? box.extent.x : Axis == 1 ? box.extent.y : box.extent.z;
-                    const auto w = static_cast<int>(first < 0 ? 0 : first < n ? first : n);
+                    const auto w = static_cast<int>(behind < 0 ? 0 : behind < n ? behind : n);
                     const auto q = core::to_xyz(Axis, static_cast<int>(u), static_cast<int>(v), w);
                     if (w < n) atomicXor(inside + box.first_word(q[1], q[2]) + q[0] / 32, 1u << q[0] % 32);
                     if constexpr (Axis == 0) {
@@ -86,19 +129,10 @@ __global__ __launch_bounds__(threads_per_block,
                                   1u << q[0] % 32);
                     }
                 });
-        __syncwarp();
+        }
+        __syncthreads();
     }
-    if constexpr (Axis == 0) {
-        const auto add = [](unsigned long long one, unsigned long long* total) {
-            const unsigned long long sum = block_sum(one);
-            if (threadIdx.x == 0 && sum != 0) atomicAdd(total, sum);
-        };
-        add(crossings, &state->solid.crossings);
-        add(classes[static_cast<int>(triangle_class::drawn)], &state->drawn);
-        add(classes[static_cast<int>(triangle_class::nonfinite)], &state->nonfinite);
-        add(classes[static_cast<int>(triangle_class::too_far)], &state->too_far);
-        add(classes[static_cast<int>(triangle_class::outside)], &state->outside);
-    }
+    if constexpr (Axis == 0) totals.add_up(true, state);
 }
 
 // Each bit becomes the parity of those up to it: along x, a thread a row, or along y or z.
@@ -183,11 +217,13 @@ void add_votes(const vote_memory& m, const stored_triangles& source, std::uint32
         copy_from_slab(masks.inside[2], slab->below, box, 1, stream);
         copy_from_slab(masks.open[2], slab->open, box, 1, stream);
     }
-    const unsigned blocks = fill_device(std::uint64_t{num_triangles} * 32, 4);
+    constexpr unsigned per_multiprocessor = 4;
+    const unsigned batches = fill_device(num_triangles, per_multiprocessor),
+                   most = fill_device(~0u, per_multiprocessor), shares = most / batches > 1 ? most / batches : 1;
     const auto toggle = [&]<int Axis>() {
-        toggle_along_kernel<Axis, pipeline_state>
-            <<<blocks, threads_per_block, 0, stream>>>(source, first_triangle, num_triangles, grid, box,
-                                                       slab != nullptr, masks.inside[Axis], masks.open[Axis], state);
+        toggle_along_kernel<Axis, pipeline_state><<<batches * shares, threads_per_block, 0, stream>>>(
+            source, first_triangle, num_triangles, shares, grid, box, slab != nullptr, masks.inside[Axis],
+            masks.open[Axis], state);
         check(cudaGetLastError(), stage::coarse_raster);
     };
     toggle.template operator()<0>();

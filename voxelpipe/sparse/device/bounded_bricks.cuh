@@ -40,9 +40,9 @@ public:
     bounded_index(const glm::ivec3& whole, const brick_room& room, arena& memory)
         : size_(index_size_of(whole)), room_(room), unused_total_(memory.take<unsigned long long>(1)) {
         std::uint32_t most = 0;
-        for (int l = size_.levels - 1; l >= 0; --l) {
+        for (int l = levels() - 1; l >= 0; --l) {
             num_words_[l] = static_cast<std::uint32_t>(
-                l + 1 == size_.levels ? size_.top_words : (room.nodes + spare_cells) << index_level::log2_node_words);
+                l + 1 == levels() ? size_.top_words : (room.nodes + spare_cells) << index_level::log2_node_words);
             words_[l] = memory.take<index_word>(num_words_[l]);
             if (l != 0) keys_[l] = memory.take<std::uint64_t>(room.nodes + spare_cells);
             most = std::max(most, num_words_[l]);
@@ -55,14 +55,14 @@ public:
 
     // Before anything is marked.
     void clear(cudaStream_t stream) const {
-        for (int l = 0; l < size_.levels; ++l)
+        for (int l = 0; l < levels(); ++l)
             check(cudaMemsetAsync(words_[l], 0, num_words_[l] * sizeof(index_word), stream));
     }
     // Calls mark(index_level, log2 of its cells' voxels) for the levels above the bricks. *nodes becomes the number of
     // nodes, or is left as it is.
     template <class Mark>
     void mark_above(const Mark& mark, unsigned long long* nodes, cudaStream_t stream) const {
-        for (int l = size_.levels - 1; l > 0; --l) {
+        for (int l = levels() - 1; l > 0; --l) {
             mark(index_level{nullptr, words_[l], l == 1 ? words_[2] : nullptr}, brick_index<>::log2_cell_of(l));
             number(l, room_.nodes, l == 1 ? nodes : unused_total_, keys_[l], stream);
         }
@@ -73,6 +73,10 @@ public:
     }
 
 private:
+    static constexpr int max_levels = 3;
+    // Levels of the grid's index. The bound is what the compiler needs to see that the arrays below are long enough.
+    [[nodiscard]] int levels() const { return std::min(size_.levels, max_levels); }
+
     void number(int l, std::uint64_t most, unsigned long long* total, std::uint64_t* keys, cudaStream_t stream) const {
         constexpr stage where = stage::tile_sort;
         index_word* const words = words_[l];
@@ -84,14 +88,14 @@ private:
                       static_cast<const unsigned long long*>(before_), static_cast<std::uint32_t>(most), total);
         launch_kernel(false, list_keys<0>, num_blocks(n), threads_per_block, 0, stream, where,
                       static_cast<const index_word*>(words), n,
-                      static_cast<const std::uint64_t*>(l + 1 < size_.levels ? keys_[l + 1] : nullptr), most, keys);
+                      static_cast<const std::uint64_t*>(l + 1 < levels() ? keys_[l + 1] : nullptr), most, keys);
     }
 
     index_size size_;
     brick_room room_;
-    std::uint32_t num_words_[3]{};
-    index_word* words_[3]{};   // of bricks, nodes, groups
-    std::uint64_t* keys_[3]{}; // of nodes and groups
+    std::uint32_t num_words_[max_levels]{};
+    index_word* words_[max_levels]{};   // of bricks, nodes, groups
+    std::uint64_t* keys_[max_levels]{}; // of nodes and groups
     unsigned long long* unused_total_;
     std::uint32_t* counts_;
     unsigned long long* before_;
