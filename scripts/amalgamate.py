@@ -58,7 +58,7 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "build" / "amalgamated" / "voxelpipe_cpu.hpp")
     out = parser.parse_args().out
     lines, seen = [HEAD.format(version=version())], set()
-    for folder, pattern in (("cpu_ref", "backend.hpp"), ("voxelpipe", "*.hpp"), ("voxelpipe/io", "*.hpp")):
+    for folder, pattern in (("cpu_ref", "backend.hpp"), ("voxelpipe", "*.hpp"), ("voxelpipe/levels", "*.hpp"), ("voxelpipe/sparse", "*.hpp"), ("voxelpipe/sparse/io", "*.hpp")):
         for file in sorted((ROOT / folder).glob(pattern)):
             name = file.relative_to(ROOT).as_posix()
             if name not in seen:

@@ -64,7 +64,7 @@ def main():
     text = re.sub(r"^(?:template <[^\n]*>\n)*(?=[a-z])[^\n{};#(/]*\b\w+::~?\w+\([^;{]*\)[^;{]*\{.*?^\}", "", text, flags=re.M | re.S)
     # A group for each header, which a page of the site shows.
     name = sys.argv[1].rsplit("/voxelpipe/", 1)[-1].removeprefix("voxelpipe/")
-    name = "cpu_backend.hpp" if name.endswith("cpu_ref/backend.hpp") else name
+    name = "cpu_backend.hpp" if name.endswith("cpu_ref/cpu_backend.hpp") else name
     group = re.sub(r"\W", "_", name)
     text = re.sub(r"^(namespace voxelpipe(?:::\w+)* \{)$", rf"\1\n/** \\addtogroup {group} {name}\n * @{{ */\n", text, flags=re.M)
     text = re.sub(r"^(\} // namespace voxelpipe(?:::\w+)*)$", r"/** @} */\n\1", text, flags=re.M)
