@@ -11,7 +11,9 @@
 #include "sparse/sparse_formats.hpp"
 #include "sparse/sparse_voxelizer.hpp"
 #include "sparse/streamed_model.hpp"
+#include "write_bytes.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <iostream>
@@ -197,8 +199,21 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
         add_rest(report, milliseconds_since(begin));
         return;
     }
-    const storage_decision storage =
-        stream ? storage_decision{true, ""} : choose_storage(options.storage, report.request, options.outputs);
+    storage_decision storage{true, ""};
+    // Outputs are written one after the other.
+    report.request.write_bytes = [&](double bricks, double voxels, double in_tiles) {
+        double bytes = 0;
+        for (const std::filesystem::path& output : options.outputs)
+            bytes = std::max(bytes, bytes_to_write(output,
+                                                   {report.request.grid.extent, report.request.targets, storage.sparse,
+                                                    bricks, voxels, in_tiles},
+                                                   options.write));
+        return bytes;
+    };
+    if (!stream) {
+        storage.sparse = false;
+        storage = choose_storage(options.storage, report.request, options.outputs, dense_need(model, report.request));
+    }
     const glm::ivec3 extent = report.request.grid.extent;
     if (!options.quiet && !storage.reason.empty())
         std::cerr << "voxelize: a sparse grid of " << extent.x << " x " << extent.y << " x " << extent.z

@@ -188,7 +188,6 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
     voxelize_stats before;
     const auto write = [&](std::size_t i, sparse_volume&& bricks, const voxelize_stats& until) {
         bricks.channels.resize(num_targets);
-        if (!bricks.tiles.empty()) bricks = open_tiles(bricks);
         output->write(folder.path(), missing[i], as_dense(bricks, bricks.channels));
         voxelize_stats counts;
         for (const auto& [name, count] : kept_counts) counts.*count = until.*count - before.*count;

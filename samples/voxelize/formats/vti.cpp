@@ -156,9 +156,10 @@ std::uint64_t bytes_of(const volume& v) {
 
 // The layers [first, last) of the grid, whose channels read those of `v`.
 volume layers_of(const volume& v, std::int64_t first, std::int64_t last) {
-    volume part = v;
-    part.extent[2] = last - first;
-    part.channels.clear();
+    volume part; // of v's channels none is copied
+    part.extent = {v.extent[0], v.extent[1], last - first};
+    part.origin = v.origin;
+    part.voxel_size = v.voxel_size;
     for (const channel& c : v.channels) {
         const scalar type = c.type == scalar::f16 ? scalar::f32 : c.type;
         const std::uint64_t each =

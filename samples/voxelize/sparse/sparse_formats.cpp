@@ -306,13 +306,13 @@ std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const st
 #ifdef VOXELIZE_HAS_OPENVDB
     if (extension == ".vdb") return write_vdb(v, path, options);
 #endif
-    if (!v.tiles.empty()) return write_sparse(open_tiles(v), path, options); // the others name every voxel
+    if (is_streamed(extension)) return write(as_dense(v, v.channels), path, options); // they hold all channels
+    if (!v.tiles.empty()) return write_sparse(open_tiles(v), path, options);          // the others name every voxel
     if (extension == ".npz") return write_sparse_npz(v, path, options);
     if (extension == ".npy") return write_sparse_npy(v, path, options);
     if (extension == ".png") return write_sparse_png(v, path, options);
     if (extension == ".html") return write_page(v, path, options);
-    if (is_streamed(extension)) return write(as_dense(v, v.channels), path, options); // they hold all channels
-    return write(voxel_shape(v), path, options);                                      // they show the occupied voxels
+    return write(voxel_shape(v), path, options); // they show the occupied voxels
 }
 
 } // namespace voxelize

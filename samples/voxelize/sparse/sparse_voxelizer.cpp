@@ -26,12 +26,11 @@ namespace voxelize {
 namespace slabs = voxelpipe::slabs;
 
 storage_decision choose_storage(storage_choice choice, const voxelize_request& request,
-                                std::span<const std::filesystem::path> outputs) {
+                                std::span<const std::filesystem::path> outputs, double dense_bytes) {
     if (choice == storage_choice::dense) return {};
     const auto bricks_alone = std::find_if(outputs.begin(), outputs.end(), is_sparse_format);
     const bool needs_bricks = bricks_alone != outputs.end();
-    const double dense = volume_bytes(request);
-    const bool fits = dense <= static_cast<double>(memory::room());
+    const bool fits = dense_bytes <= static_cast<double>(memory::room());
     const bool insists = choice == storage_choice::sparse;
     if (!insists && !needs_bricks && fits) return {};
     const char* refused = nullptr;
@@ -43,7 +42,7 @@ storage_decision choose_storage(storage_choice choice, const voxelize_request& r
     }
     if (choice == storage_choice::sparse) return {true, ""};
     return {true, needs_bricks ? std::string(find_format(*bricks_alone)->extension) + " holds occupied voxels alone"
-                               : "a dense one would take " + memory::mebibytes(dense)};
+                               : "a dense one would take " + memory::mebibytes(dense_bytes)};
 }
 
 // The pipeline reads the request and writes the counts where they lie.

@@ -25,10 +25,10 @@ struct storage_decision {
     std::string reason; // half a line, if the choice was automatic and fell on bricks
 };
 
-// Bricks where an output has no dense form, or where a dense grid does not fit the run's memory. Throws backend_error
-// where --sparse cannot be had.
+// Bricks where an output has no dense form, or where the bytes that a dense grid needs do not fit the run's memory.
+// Throws backend_error where --sparse cannot be had.
 [[nodiscard]] storage_decision choose_storage(storage_choice choice, const voxelize_request& request,
-                                              std::span<const std::filesystem::path> outputs);
+                                              std::span<const std::filesystem::path> outputs, double dense_bytes);
 
 // Draws parts of a grid from one model, which it keeps. Members throw std::bad_alloc.
 class sparse_drawer {
