@@ -89,7 +89,7 @@ def test_exterior_of_a_sphere_without_forty_faces_says_what_it_lost_and_names_wh
     grid = vp.fit(mesh, size)
     truth = vp.solid(whole, grid, extent="inner")
     status = {}
-    with pytest.warns(vp.OpenMeshWarning, match="came in by 1 holes of the mesh, of up to [0-9]+ voxels") as caught:
+    with pytest.warns(vp.OpenMeshWarning, match="came in by 1 hole of the mesh, of up to [0-9]+ voxels") as caught:
         emptied = vp.solid(mesh, grid, repair="exterior", status=status)
     assert volume_of(emptied & truth, grid) < 0.1 * volume_of(truth, grid)
     assert status["open_rows"] == 0 and status["lost_voxels"] > 0.9 * truth.sum()
@@ -149,7 +149,7 @@ def test_exterior_refuses_a_grid_within_the_mesh_and_says_where_the_mesh_leaves_
         vp.solid(mesh, vp.Grid((14, 14, 14), (1, 1, 1), (8, 8, 8)), repair="exterior")
     status = {}
     with pytest.warns(vp.OpenMeshWarning, match="where the mesh leaves the grid"):
-        half = vp.solid(mesh, vp.Grid((0, 0, 0), (1, 1, 1), (18, 36, 36)), repair="exterior", status=status)
+        half = vp.solid(mesh, vp.Grid((0, 0, 0), (1, 1, 1), (36, 36, 18)), repair="exterior", status=status)
     assert status["face_voxels"] == status["lost_voxels"] == (crop & ~half).sum() > 4000
     assert status["entered_holes"] == status["tried_closing"] == 0
     outside = vp.Grid((40, 40, 40), (1, 1, 1), (8, 8, 8))

@@ -32,7 +32,8 @@ def _entry(flood: dict[str, int]) -> str:
     """Where the flood came in."""
     entries = []
     if flood["entered_holes"]:
-        entries.append(f'by {flood["entered_holes"]} holes of the mesh, of up to {flood["hole_width"]} voxels')
+        holes = "hole" if flood["entered_holes"] == 1 else "holes"
+        entries.append(f'by {flood["entered_holes"]} {holes} of the mesh, of up to {flood["hole_width"]} voxels')
     if flood["face_voxels"]:
         entries.append(f'where the mesh leaves the grid ({flood["face_voxels"]} voxels: take a grid that holds it)')
     return " and ".join(entries) or "where no hole was found"

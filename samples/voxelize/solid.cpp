@@ -119,8 +119,8 @@ std::string flood_warning(const solid_request& request, const solid_counts& coun
     if (flood.lost_voxels == 0) return is_empty ? nothing : "";
     std::string entry;
     if (flood.entered_holes != 0)
-        entry = " by " + std::to_string(flood.entered_holes) + " holes of the model, of up to " +
-                std::to_string(flood.hole_width) + " voxels,";
+        entry = " by " + std::to_string(flood.entered_holes) + (flood.entered_holes == 1 ? " hole" : " holes") +
+                " of the model, of up to " + std::to_string(flood.hole_width) + " voxels,";
     if (flood.face_voxels != 0)
         entry +=
             (entry.empty() ? " where" : " and where") +

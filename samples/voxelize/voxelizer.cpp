@@ -9,6 +9,8 @@
 
 #include <cpu_ref/backend.hpp>
 
+#include <glm/vector_relational.hpp>
+
 #include <algorithm>
 #include <chrono>
 #include <new>

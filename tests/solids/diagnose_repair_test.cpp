@@ -55,6 +55,7 @@ TEST(DiagnoseRepair, ASphereWithoutFortyFacesNamesItsHoleAndWhatKeepsItsInside) 
         const voxel_set inside = library_solid(whole, g, {.extent = vp::solid_extent::inner}).voxels;
         for (const glm::vec3& direction : {glm::vec3(1, 0, 0), glm::vec3(0.5f, 0.6f, 0.7f)})
             for (const std::size_t faces : {std::size_t{10}, std::size_t{40}, std::size_t{100}}) {
+                if (n > 24 && (faces != 40 || direction.y == 0)) continue;
                 SCOPED_TRACE(std::to_string(faces) + " faces at " + std::to_string(n));
                 const mesh open = without_faces(whole, faces, direction);
                 const vp::status s = diagnose(open, g);

@@ -267,6 +267,7 @@ TEST(Solids, DiagnosesAreTheCpus) {
         const vp::mesh<vp::cpu_backend> here(cpu, m.positions, m.triangles);
         const vp::mesh<vp::cuda_backend> there(gpu, m.positions, m.triangles);
         for (const int closing : {0, 2}) {
+            if (closing != 0 && &m == &meshes[0]) continue; // takes long to emulate
             vp::solid_options options;
             options.closing = closing;
             const vp::status a = vp::diagnose_repair(cpu, here.view(), g, vp::passthrough{}, options),

@@ -76,6 +76,7 @@ drawn_sphere draw_sphere(const scratch_folder& folder, std::size_t missing, cons
     if (d.result.code != 0) return d;
     d.stats = json::parse(d.result.out);
     d.voxels = d.stats["voxels"].get<std::size_t>();
+    for (const json& warning : d.stats["warnings"]) d.result.err += warning.get<std::string>() + '\n';
     return d;
 }
 
@@ -112,7 +113,7 @@ TEST(Floods, ASphereWithoutFortyFacesSaysWhatItLostAndWhatKeepsIt) {
         EXPECT_LE(7, flood["hole_width"].get<int>());
         EXPECT_GE(13, flood["hole_width"].get<int>());
         EXPECT_NE(std::string::npos,
-                  text.find("by 1 holes of the model, of up to " + flood["hole_width"].dump() + " voxels"))
+                  text.find("by 1 hole of the model, of up to " + flood["hole_width"].dump() + " voxels"))
             << text;
         EXPECT_NE(std::string::npos, text.find("took " + flood["lost_voxels"].dump() + " voxels")) << text;
         EXPECT_NE(std::string::npos, text.find("--solid nonzero --close-holes")) << text;
