@@ -121,6 +121,20 @@ public:
         });
     }
 
+    // Used by diagnose_repair, with validated arguments: lids on all holes of each body. Throws std::bad_alloc, or
+    // std::length_error for more boundary vertices than triangles can name.
+    template <class Draw>
+    [[nodiscard]] std::vector<core::hole_cones> find_holes(std::span<const Draw> draws, const grid& g,
+                                                           bodies each) const {
+        const cpu::execution how = execution(nullptr);
+        solid_options options;
+        options.bodies = each;
+        solid_counters counts;
+        cpu::solid_geometry s = cpu::make_solid_geometry(how, draws, g, glm::ivec3(0), options);
+        (void)cpu::add_cones(s, options, counts); // more lids than can be drawn may still be measured
+        return std::move(s.cones);
+    }
+
     // Used by voxelize with a sparse framebuffer, in the same way.
     template <class Draws, class Coverage = core::known_coverage<>, class... Targets>
     [[nodiscard]] status run_sparse(const Draws& draws, const grid& g, sparse_framebuffer<cpu_backend, Targets...>& out,

@@ -22,7 +22,7 @@ CPP = {
                      "In the paper: frame-buffer types, multiple render targets, blending modes, programmable ROP.",
                      ["framebuffer.hpp", "blend.hpp", "core/layout.hpp", "core/value_traits.hpp", "core/half.hpp", "host_target.hpp"]),
     "abuffers": ("A-buffers", "Every fragment of every voxel. In the paper: A-buffer and bucketing.", ["abuffer.hpp"]),
-    "solids": ("Solids", "The inside of meshes.", ["solid.hpp", "core/crossing.hpp"]),
+    "solids": ("Solids", "The inside of meshes.", ["solid.hpp", "diagnose_repair.hpp", "core/crossing.hpp"]),
     "sparse": ("Sparse grids", "Memory in proportion to the voxels that are drawn: bricks, octrees, files.",
                ["sparse.hpp", "host_sparse.hpp", "sparse_merge.hpp", "core/brick_table.hpp", "core/brick_tile.hpp", "core/brick_lookup.hpp", "octree.hpp", "core/octree_view.hpp",
                 "reducers.hpp", "octree_dag.hpp", "backend_octree.hpp", "backend_octree_dag.hpp", "core/octree_dag_view.hpp", "io/nanovdb.hpp"]),

@@ -100,6 +100,19 @@ scene load_whole(const std::filesystem::path& file, const load_options& options,
     }
 }
 
+// A flood that has not been examined, in a grid that the model leaves.
+void warn_of_part(const bounding_box& bounds, run_report& report) {
+    const voxelize_request& request = report.request;
+    if (!request.solid || request.solid->rule != solid_rule::exterior) return;
+    if (report.stats.solid && report.stats.solid->is_examined) return;
+    const glm::dvec3 first = request.grid.part_origin(),
+                     last = first + glm::dvec3(request.grid.extent) * request.grid.voxel_size;
+    if (!bounding_box{first, last, false}.holds(bounds))
+        report.warnings.push_back(
+            "the model leaves the grid, and the flood of --solid exterior comes in there: what it "
+            "takes is not what it would take of the whole model");
+}
+
 void warn_of_dropped(run_report& report) {
     if (report.stats.triangles_dropped != 0)
         report.warnings.push_back(std::to_string(report.stats.triangles_dropped) +
@@ -107,13 +120,14 @@ void warn_of_dropped(run_report& report) {
 }
 
 // Draws and writes the slabs of this process.
-void run_slabs(const command_line& options, slab_source&& source, run_report& report) {
+void run_slabs(const command_line& options, slab_source&& source, const bounding_box& bounds, run_report& report) {
     report.is_sparse = true;
     const slab_outcome outcome = run_by_slabs(options, std::move(source), report);
     report.warnings.insert(report.warnings.end(), report.stats.warnings.begin(), report.stats.warnings.end());
     warn_of_dropped(report);
+    warn_of_part(bounds, report);
     if (outcome.finished && report.stats.voxels == 0)
-        report.warnings.push_back(why_empty(report.stats, report.request.coverage));
+        report.warnings.push_back(why_empty(report.stats, report.request, bounds.low, bounds.high));
     if (options.quiet) return;
     std::cerr << "voxelize: drew " << outcome.drawn << " of " << outcome.slabs << " slabs";
     if (options.batch.world_size > 1)
@@ -193,7 +207,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     if (options.by_slabs) {
         bar.start("voxelizing slab by slab");
         report.request.progress = [&bar](double done) { bar.show(done); };
-        run_slabs(options, {std::move(model), stream, place}, report);
+        run_slabs(options, {std::move(model), stream, place}, bounds, report);
         bar.clear();
         report.peak_memory = memory::peak();
         add_rest(report, milliseconds_since(begin));
@@ -232,7 +246,9 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     const std::uint64_t num_bricks = bricks.keys.size(), brick_bytes = bricks.num_bytes();
     for (const std::string& warning : report.stats.warnings) report.warnings.push_back(warning);
     warn_of_dropped(report);
-    if (report.stats.voxels == 0) report.warnings.push_back(why_empty(report.stats, report.request.coverage));
+    warn_of_part(bounds, report);
+    if (report.stats.voxels == 0)
+        report.warnings.push_back(why_empty(report.stats, report.request, bounds.low, bounds.high));
 
     start = clock::now();
     for (const std::filesystem::path& output : options.outputs) {

@@ -9,6 +9,8 @@
 
 #include <cpu_ref/backend.hpp>
 
+#include <glm/vector_relational.hpp>
+
 #include <algorithm>
 #include <chrono>
 #include <new>
@@ -183,7 +185,9 @@ volume with_ring(volume inside, const voxelize_request& request) {
 
 } // namespace
 
-std::string why_empty(const voxelize_stats& stats, voxelpipe::coverage coverage) {
+std::string why_empty(const voxelize_stats& stats, const voxelize_request& request, const glm::dvec3& low,
+                      const glm::dvec3& high) {
+    const voxelpipe::coverage coverage = request.coverage;
     const std::string text = "no voxel is covered: ";
     if (stats.fragments_discarded != 0)
         return text + "alpha discards all " + std::to_string(stats.fragments_discarded) + " fragments";
@@ -201,7 +205,14 @@ std::string why_empty(const voxelize_stats& stats, voxelpipe::coverage coverage)
         return text + "no triangle, line or point has positions that can be drawn";
     if (stats.triangles != 0 && stats.triangles_dropped == stats.triangles)
         return text + "no triangle has three positions that can be drawn";
-    return text + "the model lies outside the grid";
+    const voxelpipe::grid& grid = request.grid;
+    const glm::dvec3 first = grid.part_origin(), last = first + glm::dvec3(grid.extent) * grid.voxel_size;
+    if (glm::any(glm::greaterThan(first, high)) || glm::any(glm::lessThan(last, low)))
+        return text + "the model lies outside the grid";
+    const bool is_within = glm::all(glm::greaterThanEqual(first, low)) && glm::all(glm::lessThanEqual(last, high));
+    return text + "no triangle, line or point meets the grid, which lies " +
+           (is_within ? "within the model's bounds" : "across the model's bounds, where nothing is") +
+           ": move or enlarge it with --origin and --extent, or take what encloses it with --solid nonzero";
 }
 
 std::string cancelled_warning(const voxelize_stats& stats) {
@@ -230,6 +241,7 @@ volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_st
     try {
         voxelize_request inside = request;
         inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
+        if (inside.solid) inside.solid->is_whole = true;
         if (request.backend != backend_choice::cpu)
             if (std::optional<volume> result = try_cuda(model, inside, stats))
                 return with_ring(std::move(*result), request);

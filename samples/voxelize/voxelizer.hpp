@@ -120,8 +120,9 @@ struct backend_error : std::runtime_error {
 // Throws memory_error, backend_error, and std::runtime_error for what the library refuses.
 [[nodiscard]] volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats);
 
-// The reason why no voxel is covered, one line; for stats that count none.
-[[nodiscard]] std::string why_empty(const voxelize_stats& stats, voxelpipe::coverage coverage);
+// The reason why no voxel is covered, one line; for stats that count none. low, high: the model's bounds.
+[[nodiscard]] std::string why_empty(const voxelize_stats& stats, const voxelize_request& request, const glm::dvec3& low,
+                                    const glm::dvec3& high);
 
 // One line on normals that cancel; empty where none do.
 [[nodiscard]] std::string cancelled_warning(const voxelize_stats& stats);

@@ -146,6 +146,12 @@ public:
                                    abuffer<cuda_backend, Payload>& lists, const solid_options& options,
                                    std::uint64_t triangles_in);
 
+    // Implements diagnose_repair: lids on all holes of each body. Waits. Throws std::bad_alloc, std::length_error, or
+    // std::runtime_error with CUDA's text. Defined in device/optional/solid.cuh.
+    template <class Mesh, class VertexShader, class SolidShader>
+    [[nodiscard]] std::vector<core::hole_cones> find_holes(std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
+                                                           const grid& g, bodies each);
+
     // Implement voxelize and clear of sparse framebuffers. Arguments are validated. Defined in
     // device/optional/sparse.cuh.
     template <class Mesh, class VertexShader, class FragmentShader, class... Targets,

@@ -157,6 +157,7 @@ sparse_volume run_sparse_voxelizer(scene&& model, const voxelize_request& reques
                                    voxelize_stats& stats) {
     voxelize_request inside = request;
     inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
+    if (inside.solid) inside.solid->is_whole = true;
     const bool bits_fit = decided_layer_bytes(request) * request.grid.extent.z <= static_cast<double>(memory::room());
     try {
         if (!bits_fit && model.triangle_count() != 0) return draw_in_slabs(std::move(model), request, folder, stats);

@@ -10,6 +10,12 @@
 #include <voxelpipe/device/solid/solid_call.cuh>
 #include <voxelpipe/device/solid/solid_cones.cuh>
 
+#include <new>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
 namespace voxelpipe {
 
 template <class Mesh, class VertexShader, class SolidShader, class... Targets>
@@ -42,6 +48,19 @@ status cuda_backend::run_solid(std::span<const draw<Mesh, VertexShader, SolidSha
                 return false;
             });
     });
+}
+
+template <class Mesh, class VertexShader, class SolidShader>
+std::vector<core::hole_cones> cuda_backend::find_holes(std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
+                                                       const grid& g, bodies each) {
+    solid_options options;
+    options.bodies = each;
+    try {
+        return device::find_cones(*this, draws, g, options);
+    } catch (const device::cuda_failure& e) {
+        if (e.error == cudaErrorMemoryAllocation) throw std::bad_alloc();
+        throw std::runtime_error(std::string("voxelpipe: ") + cudaGetErrorString(e.error));
+    }
 }
 
 template <class Call, class Draw, class Write>
