@@ -111,6 +111,28 @@ TEST(ToolSlabs, AKilledRunGoesOn) {
     expect_same_group(t, "whole.zarr", "m.zarr");
 }
 
+// The same command twice at once, and a third that is killed while another waits for it.
+TEST(ToolSlabs, TwoRunsAtOnceEndWell) {
+    const tower t({"-t", "occupancy,color", "--sparse", "--padding", "2"}, 256); // 10 slabs
+    ASSERT_EQ(0, t.draw("whole.zarr", {}).code);
+    for (const bool is_killed : {false, true}) {
+        SCOPED_TRACE(is_killed);
+        fs::remove_all(t.folder / "m.zarr");
+        const pid_t first = t.begin("m.zarr", {"--resume"});
+        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+        while (t.unfinished().empty() && std::chrono::steady_clock::now() < end)
+            std::this_thread::sleep_for(std::chrono::microseconds(100));
+        const pid_t second = t.begin("m.zarr", {"--resume"});
+        std::this_thread::sleep_for(std::chrono::milliseconds(is_killed ? 5 : 0));
+        if (is_killed) kill(first, SIGKILL);
+        const outcome a = wait_for(t.folder, first), b = wait_for(t.folder, second);
+        if (!is_killed) EXPECT_EQ(0, a.code) << a.err;
+        EXPECT_EQ(0, b.code) << b.err;
+        EXPECT_TRUE(t.unfinished().empty());
+        expect_same_group(t, "whole.zarr", "m.zarr");
+    }
+}
+
 // Processes that come late, as those of slow hosts do: without a slab of their own, and while another process makes the
 // output.
 TEST(ToolSlabs, LateProcessesLeaveNothing) {

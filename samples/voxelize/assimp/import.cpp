@@ -89,6 +89,14 @@ public:
     }
     void Close(Assimp::IOStream* stream) override { delete stream; }
 
+    // The files that were read beside the model.
+    [[nodiscard]] std::vector<std::string> others() const {
+        std::vector<std::string> names;
+        for (const auto& [path, bytes] : others_)
+            if (bytes) names.push_back(path.string());
+        return names;
+    }
+
     // The material libraries that were asked for: all of them are missing, and this is the first.
     [[nodiscard]] std::optional<std::string> missing_materials() const {
         std::optional<std::string> first;
@@ -318,6 +326,7 @@ model read_model(std::span<const std::byte> bytes, const std::string& name, cons
                                   " cannot be read: surfaces are white");
         for (material& entry : result.materials) entry.base_color = glm::vec4(1);
     }
+    result.files = files->others();
     left_out without;
     std::vector<std::vector<std::uint32_t>> primitives_of(scene->mNumMeshes); // by mesh
     for (unsigned i = 0; i < scene->mNumMeshes; ++i)

@@ -25,15 +25,15 @@ namespace voxelize {
 
 namespace slabs = voxelpipe::slabs;
 
-storage_decision choose_storage(storage_choice choice, const voxelize_request& request,
+storage_decision choose_storage(storage_choice choice, const voxelize_request& request, std::size_t num_implied,
                                 std::span<const std::filesystem::path> outputs) {
     if (choice == storage_choice::dense) return {};
     const auto bricks_alone = std::find_if(outputs.begin(), outputs.end(), is_sparse_format);
     const bool needs_bricks = bricks_alone != outputs.end();
+    const auto room = static_cast<double>(memory::room());
     const double dense = volume_bytes(request);
-    const bool fits = dense <= static_cast<double>(memory::room());
     const bool insists = choice == storage_choice::sparse;
-    if (!insists && !needs_bricks && fits) return {};
+    if (!insists && !needs_bricks && dense <= room) return {};
     const char* refused = nullptr;
     if (request.backend == backend_choice::cuda)
         refused = "the tool draws sparse grids on the CPU, not with --backend cuda";
@@ -41,9 +41,14 @@ storage_decision choose_storage(storage_choice choice, const voxelize_request& r
         if (insists) throw backend_error(std::string("a sparse grid: ") + refused);
         return {};
     }
-    if (choice == storage_choice::sparse) return {true, ""};
-    return {true, needs_bricks ? std::string(find_format(*bricks_alone)->extension) + " holds occupied voxels alone"
-                               : "a dense one would take " + memory::mebibytes(dense)};
+    if (insists) return {true, true, ""};
+    // As it is without the other outputs and what they ask for.
+    voxelize_request alone = request;
+    alone.targets.resize(alone.targets.size() - num_implied);
+    const bool lists = volume_bytes(alone) > room;
+    return {true, lists,
+            needs_bricks ? std::string(find_format(*bricks_alone)->extension) + " holds occupied voxels alone"
+                         : "a dense one would take " + memory::mebibytes(dense)};
 }
 
 // The pipeline reads the request and writes the counts where they lie.
