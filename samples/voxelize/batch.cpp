@@ -104,7 +104,7 @@ json record_of(const listed_model& model, const std::string& work) {
 
 // In the process of a model: does the work, sends the record through OUT.
 [[noreturn]] void run_child(const command_line& all, const listed_model& model, const std::string& work,
-                            const output_check* known, int out) {
+                            output_check* known, int out) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     const auto begin = clock::now();
     command_line options = all;
@@ -162,7 +162,7 @@ json record_of(const listed_model& model, const std::string& work) {
 class workers {
 public:
     // known: what all models read and write, as run_model() takes it.
-    explicit workers(const output_check* known) : known_(known) {}
+    explicit workers(output_check* known) : known_(known) {}
 
     struct job {
         listed_model model;
@@ -218,7 +218,7 @@ public:
     }
 
 private:
-    const output_check* known_;
+    output_check* known_;
     std::vector<job> jobs_;
 };
 
@@ -239,16 +239,18 @@ output_check check_list(const command_line& options, const std::vector<listed_mo
         held = options.storage == storage_choice::sparse ? held_as::list : held_as::grid;
     voxelize_request request = options.voxelize;
     request.grid.extent = glm::ivec3(0);
-    std::unordered_set<std::string> own = finished.files();
-    bool has_others = false; // files that are there and that no run over this list has written
+    const std::unordered_set<std::string> own = finished.files();
+    bool has_others =
+        false; // files that are there and may be another model's: pictures, or not of a run over this list
     for (const listed_model& model : models)
         for (const fs::path& pattern : options.outputs) {
             const fs::path output = with_name(pattern, model.name);
             const written_names names = names_of_output(options, request, output, held);
             check.add_output(output, names);
+            const bool is_picture = lower_extension(output) == ".png";
             for (const fs::path& file : names.files) {
                 std::error_code error;
-                has_others = has_others || (!own.contains(file.string()) && fs::exists(file, error));
+                has_others = has_others || ((is_picture || !own.contains(file.string())) && fs::exists(file, error));
             }
         }
     // The files that models name are looked for only where an output may be one of them.

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t most_looked_at = 1000; // numbered names that are there and may be links
 
-fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
+fs::path folder_around(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
 
 std::string quoted(const std::string& text) { return '\'' + text + '\''; }
 
@@ -72,7 +72,7 @@ std::optional<output_check::identity> output_check::identify(const fs::path& pat
     std::error_code error;
     fs::path missing = path;
     if (::lstat(path.c_str(), &found) == 0) missing = fs::weakly_canonical(path, error); // a link to what is not there
-    if (::stat(folder_of(missing).c_str(), &found) == 0) return numbers(missing.filename().string());
+    if (::stat(folder_around(missing).c_str(), &found) == 0) return numbers(missing.filename().string());
     missing = fs::absolute(missing, error).lexically_normal();
     fs::path rest = missing.filename();
     for (fs::path folder = missing.parent_path();; folder = folder.parent_path()) {
@@ -88,10 +88,10 @@ const std::optional<output_check::identity>& output_check::identify_folder(const
 }
 
 const std::vector<output_check::identity>& output_check::folders_around(const fs::path& file) {
-    const auto [known, is_new] = folders_around_.try_emplace(folder_of(file).string());
+    const auto [known, is_new] = folders_around_.try_emplace(folder_around(file).string());
     if (!is_new) return known->second;
     std::error_code error;
-    fs::path folder = fs::weakly_canonical(fs::absolute(folder_of(file), error), error);
+    fs::path folder = fs::weakly_canonical(fs::absolute(folder_around(file), error), error);
     for (;; folder = folder.parent_path()) {
         if (const auto& id = identify_folder(folder)) known->second.push_back(*id);
         if (folder == folder.parent_path()) return known->second;
@@ -122,7 +122,7 @@ void output_check::add(const fs::path& file, std::size_t by, bool is_known) {
     if (replaces_folders_) add_to_folders(file, *id, by);
     const std::optional<numbered_name> name = split_number(file.filename().string());
     if (!name) return;
-    const std::optional<identity>& folder = identify_folder(folder_of(file));
+    const std::optional<identity>& folder = identify_folder(folder_around(file));
     if (!folder) return;
     const pattern with{*folder, name->prefix, name->suffix};
     with_number_[with].push_back({name->number, by});

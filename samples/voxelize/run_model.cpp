@@ -139,7 +139,7 @@ bool is_large(const scene& model) {
 // What else a run reads and writes.
 struct other_files {
     std::set<std::filesystem::path> named; // by the model, relative to its folder
-    const output_check* known = nullptr;   // of a list
+    output_check* known = nullptr;         // of a list
 };
 
 // Does the work, with the model as OPENED has it. helps_to_stream: true as long as a shortage of memory may be one that
@@ -258,7 +258,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
 
 // Every failure is an exception. Streams a model that does not fit otherwise. How much its pictures take is known only
 // once they are held, and how much drawing takes only by an estimate: one that may fit is loaded first.
-void run_either_way(const command_line& given, clock::time_point begin, const output_check* known, run_report& report) {
+void run_either_way(const command_line& given, clock::time_point begin, output_check* known, run_report& report) {
     other_files others{{}, known};
     command_line options = given;
     options.load.gltf.names_file = [&others](const std::filesystem::path& file) { others.named.insert(file); };
@@ -289,7 +289,7 @@ void run_either_way(const command_line& given, clock::time_point begin, const ou
 
 } // namespace
 
-run_outcome run_model(const command_line& options, clock::time_point begin, const output_check* known) {
+run_outcome run_model(const command_line& options, clock::time_point begin, output_check* known) {
     run_outcome result;
     const auto fail = [&result](exit_code code, const std::string& why) {
         result.code = code;

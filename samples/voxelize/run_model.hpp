@@ -24,6 +24,6 @@ struct run_outcome {
 // Does the work of a command line. The program, or this model, began at BEGIN. known: of a list, what all of its models
 // read and write; may be null. Throws nothing.
 [[nodiscard]] run_outcome run_model(const command_line& options, std::chrono::steady_clock::time_point begin,
-                                    const output_check* known = nullptr);
+                                    output_check* known = nullptr);
 
 } // namespace voxelize

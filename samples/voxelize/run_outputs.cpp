@@ -29,8 +29,9 @@ written_names names_of_output(const command_line& options, const voxelize_reques
 }
 
 void check_outputs(const command_line& options, const voxelize_request& request, const std::set<fs::path>& named,
-                   held_as held, const output_check* known) {
-    output_check check = known != nullptr ? *known : output_check(options.outputs);
+                   held_as held, output_check* known) {
+    output_check own(options.outputs);
+    output_check& check = known != nullptr ? *known : own;
     const fs::path folder = options.input.parent_path();
     check.add_input(options.input, "the model '" + options.input.string() + '\'');
     for (const fs::path& file : named) {

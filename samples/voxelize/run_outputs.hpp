@@ -18,8 +18,8 @@ namespace voxelize {
 
 // Refuses outputs of one model that would replace a file of the model or each other, and a .zarr that this tool did not
 // write. named: the files that the model names, relative to its folder. known: what else the run reads and writes,
-// these outputs among it; may be null. Throws output_conflict and write_error.
+// these outputs among it, to which the model's files are added; may be null. Throws output_conflict and write_error.
 void check_outputs(const command_line& options, const voxelize_request& request,
-                   const std::set<std::filesystem::path>& named, held_as held, const output_check* known);
+                   const std::set<std::filesystem::path>& named, held_as held, output_check* known);
 
 } // namespace voxelize

@@ -207,11 +207,11 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
         stats.triangles = source.stream != nullptr ? source.stream->num_triangles() : source.model.triangle_count();
     };
     std::unique_ptr<folder_lock> lock;
-    if (!share.empty() || folder.is_there())
+    if (!share.empty())
         lock = folder.lock_share(options.batch, [&source] {
             if (source.place.say) source.place.say("another process draws the same slabs: waiting for its end");
         });
-    if (!lock || !*lock) { // the output is made, or others make it
+    if (lock ? !*lock : !folder.is_there()) { // the output is made, or others make it
         count_triangles();
         return outcome;
     }
@@ -251,7 +251,7 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
     std::vector<fs::path> files = folder.finish(all, outcome.left);
     lock.reset();
     std::error_code ignored;
-    if (!files.empty()) fs::remove(folder.path(), ignored); // NFS, as above
+    fs::remove(folder.path(), ignored); // if it is empty: NFS, as above
     if (outcome.left != 0 && options.batch.world_size == 1)
         throw write_error(folder.path(), "slabs that this run has written are gone");
     if (files.empty()) return outcome;

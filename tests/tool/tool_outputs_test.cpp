@@ -93,7 +93,7 @@ TEST(ToolOutputs, AGltfItsBuffersAndPicturesStay) {
     fs::create_symlink(folder / "data.bin", folder / "b.npz");
     expect_refused(folder, {model, "-o", folder / "b.npz"}, "is a buffer of '" + model + "'");
     file.write_glb(folder / "m.glb");
-    for (const std::string spelling :
+    for (const std::string& spelling :
          {std::string("m.glb"), std::string("./m.glb"), "../" + folder.path().filename().string() + "/m.glb"}) {
         const std::string output = folder / spelling;
         expect_refused(folder, {folder / "m.glb", "-o", output},
