@@ -166,7 +166,7 @@ void output_check::check_pair(std::size_t before, std::size_t now, const fs::pat
     if (!a.what.empty() && !b.what.empty()) return; // one file may be read as many
     if (a.what.empty() && b.what.empty()) {
         if (is_known && a.path == b.path) return;
-        if (a.path == file || b.path == file || a.path == b.path)
+        if (identify(a.path) == identify(b.path))
             throw output_conflict(b.called + " is the same file as " + a.called + "; name another output");
         throw output_conflict(b.called + " and " + a.called + " may both become " + quoted(file.string()) +
                               "; name another output");

@@ -137,7 +137,7 @@ TEST_F(OutputCheck, GeneratedNamesCount) {
     EXPECT_EQ("output 'y.count.npz' is the same file as output 'y.count.npz'; name another output",
               conflict({}, {"y.count.npz", "y.count.npz"}, two));
     EXPECT_EQ("", conflict({}, {"y.npy", "y.count.npz"}, two));
-    EXPECT_EQ("output 'x.2.vti' is the same file as output 'x.pvti'; name another output",
+    EXPECT_EQ("output 'x.2.vti' and output 'x.pvti' may both become 'x.2.vti'; name another output",
               conflict({}, {"x.pvti", "x.2.vti"}, two, options));
     EXPECT_NE("", conflict({}, {"x.3.vti", "x.pvti"}, two, options));
     EXPECT_EQ("", conflict({}, {"x.4.vti", "x.pvti", "x.vti"}, two, options));
