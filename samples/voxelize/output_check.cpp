@@ -71,7 +71,6 @@ std::optional<output_check::identity> output_check::identify(const fs::path& pat
     }
     std::error_code error;
     fs::path missing = path;
-    if (::lstat(path.c_str(), &found) == 0) missing = fs::weakly_canonical(path, error); // a link to what is not there
     if (::stat(folder_around(missing).c_str(), &found) == 0) return numbers(missing.filename().string());
     missing = fs::absolute(missing, error).lexically_normal();
     fs::path rest = missing.filename();

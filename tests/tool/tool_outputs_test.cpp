@@ -112,7 +112,7 @@ TEST(ToolOutputs, TwoOutputsAreTwoFiles) {
         expect_refused(folder, arguments, message);
     };
     refused({"-o", folder / "x.npy", "-o", folder / "./x.npy"}, "is the same file as output");
-    refused({"--pieces", "2", "-o", folder / "x.pvti", "-o", folder / "x.2.vti"}, "may both become");
+    refused({"--pieces", "2", "-o", folder / "x.pvti", "-o", folder / "x.1.vti"}, "may both become");
     const outcome apart = run(folder, {model, "-r", "8", "--pieces", "2", "-o", folder / "x.pvti", "-o",
                                        folder / "x.3.vti", "-o", folder / "x.npy"});
     EXPECT_EQ(0, apart.code) << apart.err;

@@ -151,8 +151,11 @@ TEST(ToolSlabs, LateProcessesLeaveNothing) {
     const pid_t late = t.begin("n.zarr", {"--world-size", "2", "--rank", "0"});
     const auto waits = [&] { // "1: -> FLOCK  ADVISORY  WRITE 123 ..."
         const std::string all = read_file("/proc/locks"), process = " " + std::to_string(late) + " ";
-        const std::size_t at = all.find(process);
-        return at != std::string::npos && all.rfind("->", at) > all.rfind('\n', at);
+        for (std::size_t at = all.find(process); at != std::string::npos; at = all.find(process, at + 1)) {
+            const std::size_t line = all.rfind('\n', at) + 1;                             // 0 of the first
+            if (all.substr(line, at - line).find("->") != std::string::npos) return true; // it holds others
+        }
+        return false;
     };
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (!waits() && std::chrono::steady_clock::now() < end)
