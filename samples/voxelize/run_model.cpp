@@ -7,6 +7,7 @@
 #include "memory.hpp"
 #include "model_file.hpp"
 #include "picture_levels.hpp"
+#include "run_outputs.hpp"
 #include "slab_run.hpp"
 #include "sparse/sparse_formats.hpp"
 #include "sparse/sparse_voxelizer.hpp"
@@ -20,6 +21,7 @@
 #include <memory>
 #include <new>
 #include <optional>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -150,10 +152,16 @@ bool is_large(const scene& model) {
     return 8 * bytes > static_cast<double>(memory::limit());
 }
 
+// What else a run reads and writes.
+struct other_files {
+    std::set<std::filesystem::path> named; // by the model, relative to its folder
+    output_check* known = nullptr;         // of a list
+};
+
 // Does the work, with the model as OPENED has it. helps_to_stream: true as long as a shortage of memory may be one that
 // a loaded model makes and a streamed one does not.
-void run(const command_line& options, clock::time_point begin, const opened_stream& opened, run_report& report,
-         bool& helps_to_stream) {
+void run(const command_line& options, clock::time_point begin, const opened_stream& opened, const other_files& others,
+         run_report& report, bool& helps_to_stream) {
     report.input = options.input;
     report.request = options.voxelize;
     progress_bar bar{!options.quiet};
@@ -205,6 +213,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
                                  if (!options.quiet) std::cerr << "voxelize: " << how << '\n';
                              }};
     if (options.by_slabs) {
+        check_outputs(options, report.request, others.named, held_as::grid, others.known);
         bar.start("voxelizing slab by slab");
         report.request.progress = [&bar](double done) { bar.show(done); };
         run_slabs(options, {std::move(model), stream, place}, bounds, report);
@@ -213,7 +222,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
         add_rest(report, milliseconds_since(begin));
         return;
     }
-    storage_decision storage{true, ""};
+    storage_decision storage{true, true, ""};
     // Outputs are written one after the other.
     report.request.write_bytes = [&](double bricks, double voxels, double in_tiles) {
         double bytes = 0;
@@ -226,8 +235,13 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     };
     if (!stream) {
         storage.sparse = false;
-        storage = choose_storage(options.storage, report.request, options.outputs, dense_need(model, report.request));
+        // As it is without the other outputs and what they ask for.
+        voxelize_request alone = report.request;
+        alone.targets.resize(alone.targets.size() - options.implied.size());
+        storage = choose_storage(options.storage, report.request, options.outputs,
+                                 {dense_need(model, report.request), dense_need(model, alone)});
     }
+    check_outputs(options, report.request, others.named, storage.lists ? held_as::list : held_as::grid, others.known);
     const glm::ivec3 extent = report.request.grid.extent;
     if (!options.quiet && !storage.reason.empty())
         std::cerr << "voxelize: a sparse grid of " << extent.x << " x " << extent.y << " x " << extent.z
@@ -253,6 +267,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     start = clock::now();
     for (const std::filesystem::path& output : options.outputs) {
         write_options how = options.write;
+        how.lists = storage.lists;
         bar.start("writing " + output.filename().string());
         how.progress = [&bar](double done) { bar.show(done); };
         how.warn = [&report](const std::string& warning) { report.warnings.push_back(warning); };
@@ -278,7 +293,10 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
 
 // Every failure is an exception. Streams a model that does not fit otherwise. How much its pictures take is known only
 // once they are held, and how much drawing takes only by an estimate: one that may fit is loaded first.
-void run_either_way(const command_line& options, clock::time_point begin, run_report& report) {
+void run_either_way(const command_line& given, clock::time_point begin, output_check* known, run_report& report) {
+    other_files others{{}, known};
+    command_line options = given;
+    options.load.gltf.names_file = [&others](const std::filesystem::path& file) { others.named.insert(file); };
     const std::filesystem::path folder = folder_of(options.outputs.front());
     const double options_ms = milliseconds_since(begin);
     report.stats.milliseconds.emplace_back("options", options_ms);
@@ -290,7 +308,7 @@ void run_either_way(const command_line& options, clock::time_point begin, run_re
     };
     std::exception_ptr shortage;
     try {
-        run(options, begin, opened, report, helps_to_stream);
+        run(options, begin, opened, others, report, helps_to_stream);
     } catch (const memory_error&) {
         shortage = keep_for_later();
     } catch (const std::bad_alloc&) {
@@ -301,23 +319,26 @@ void run_either_way(const command_line& options, clock::time_point begin, run_re
     if (!opened.stream) std::rethrow_exception(shortage);
     report = {};
     report.stats.milliseconds.emplace_back("options", options_ms);
-    run(options, begin, opened, report, helps_to_stream);
+    run(options, begin, opened, others, report, helps_to_stream);
 }
 
 } // namespace
 
-run_outcome run_model(const command_line& options, clock::time_point begin) {
+run_outcome run_model(const command_line& options, clock::time_point begin, output_check* known) {
     run_outcome result;
     const auto fail = [&result](exit_code code, const std::string& why) {
         result.code = code;
         result.error = why;
     };
     try {
-        run_either_way(options, begin, result.report);
+        run_either_way(options, begin, known, result.report);
     } catch (const model_error& error) {
         result.report.warnings = error.warnings;
         fail(exit_input, options.input.string() + ": " + error.what() +
                              (error.lenient_helps ? " (--lenient goes on all the same)" : ""));
+    } catch (const output_conflict& error) {
+        result.is_conflict = true;
+        fail(exit_usage, error.what());
     } catch (const grid_error& error) {
         fail(exit_usage, error.what());
     } catch (const memory_error& error) {

@@ -232,6 +232,18 @@ std::int64_t num_pvti_pieces(const volume& v, const write_options& options) {
     return std::clamp<std::int64_t>(pieces, 1, std::min<std::int64_t>(v.extent[2], most_pieces));
 }
 
+written_names pvti_names(const volume& shape, const std::filesystem::path& path, const write_options& options,
+                         held_as) {
+    written_names names{{path}, {}};
+    if (shape.num_voxels() == 0) {
+        names.numbered.push_back({path.parent_path(), path.stem().string() + ".", ".vti", most_pieces});
+        return names;
+    }
+    const std::int64_t pieces = std::max(num_pvti_pieces(shape, options), pieces_before(path));
+    for (std::int64_t n = 0; n < pieces; ++n) names.files.push_back(pvti_piece_path(path, n));
+    return names;
+}
+
 std::pair<std::int64_t, std::int64_t> pvti_piece_layers(const volume& v, std::int64_t piece, std::int64_t pieces) {
     return {piece * v.extent[2] / pieces, (piece + 1) * v.extent[2] / pieces};
 }
