@@ -174,10 +174,12 @@ public:
         }
     }
 
-private:
-    [[nodiscard]] cpu::execution execution(stage* at) const {
+    // How calls of this backend run. at: if not null, where the stage that runs is written.
+    [[nodiscard]] cpu::execution execution(stage* at = nullptr) const {
         return {threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency()), times, &progress, at};
     }
+
+private:
     // True if tile numbers fit 32 bits, which keeps the tile pairs small. A grid with more tiles has 2^47 voxels: more
     // than any framebuffer holds, but an A-buffer may span them.
     static bool has_small_keys(const grid& g) {

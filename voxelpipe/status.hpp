@@ -30,7 +30,7 @@ enum class status_code : std::uint8_t {
     out_of_memory,        // of the host or the device
     capacity_exceeded,    // the caller's workspace is too small; `required` says what is needed
     strategy_unavailable, // the forced strategy cannot serve the call
-    bad_solid_options,    // an option of voxelize_solid is out of its range
+    bad_solid_options,    // an option of voxelize_solid is out of its range, or has no meaning with the repair
     bad_level,            // a tessellation program gave a level below 1 or above its max_level
     bad_count,            // a geometry program emitted more triangles than its type holds
     bad_subset,           // mesh_view::part: not one number a triangle, or not ascending below `whole`
@@ -72,6 +72,28 @@ struct counters {
     friend bool operator==(const counters&, const counters&) = default;
 };
 
+// What the flood of repair::exterior did, as diagnose_repair (diagnose_repair.hpp) finds it; zeros from other calls.
+struct flood_counters {
+    // Voxels that the closed rows along x, y and z have inside (repair::vote) and the flood took. Those no further from
+    // a hole's lid (repair::close_holes) than the closing, or than 1, do not count. 0: nothing is amiss.
+    std::uint64_t lost_voxels = 0;
+    std::uint64_t enclosed_voxels = 0; // those that the flood left and no triangle touches
+    // Of lost voxels only. Voxels that closed rows and the holes' lids have inside, and a flood around mesh and lids
+    // took all the same: it came in where the mesh leaves the grid, and would not take them in a grid that holds the
+    // mesh.
+    std::uint64_t face_voxels = 0;
+    // Of lost voxels only. Holes of the mesh, components of the edges that no opposite edge cancels, by which the flood
+    // came in: it took voxels between their edges.
+    std::uint64_t entered_holes = 0;
+    std::uint32_t hole_width = 0; // of the widest of them, in voxels, rounded up; of a slit its narrow side
+    // The least solid_options::closing, of those that were tried, whose flood keeps what the holes' lids enclose; 0:
+    // none did.
+    std::int32_t closing = 0;
+    std::uint32_t close_holes = 0; // 1: repair::close_holes was tried, leaves no row open and keeps these voxels
+
+    friend bool operator==(const flood_counters&, const flood_counters&) = default;
+};
+
 // What voxelize_solid counts besides `counters`; zeros from other calls. Of a crop these are numbers of the crop's
 // rows, along x through the whole grid. Numbers of slabs along y and z add up to those of the whole; of slabs along x
 // each has the same rows, and open_rows and crossings are the same numbers.
@@ -86,6 +108,8 @@ struct solid_counters {
     std::uint64_t hole_edges = 0; // edges that no opposite edge cancels
     std::uint64_t holes = 0;      // their connected components
     std::uint64_t cones = 0;      // holes that were closed
+
+    flood_counters flood{}; // of diagnose_repair only
 
     friend bool operator==(const solid_counters&, const solid_counters&) = default;
 };
@@ -134,7 +158,7 @@ struct required_sizes {
     case status_code::strategy_unavailable:
         return "strategy unavailable: the forced strategy cannot serve this call";
     case status_code::bad_solid_options:
-        return "bad solid options: a value out of its range";
+        return "bad solid options: a value out of its range, or a rule or an extent with a repair that has its own";
     case status_code::bad_level:
         return "bad level: a tessellation program's edge_level must be 1 to its max_level";
     case status_code::bad_count:
@@ -144,7 +168,8 @@ struct required_sizes {
     case status_code::other_rank_failed:
         return "another rank or GPU failed: this one's part is not to be used";
     case status_code::crop_without_whole:
-        return "crop without whole: the exterior of a crop follows from the whole grid, draw that";
+        return "crop without whole: the exterior of a part of a mesh follows from all of it, draw a grid that holds "
+               "that";
     case status_code::no_device:
         return "no usable device";
     case status_code::device_error:

@@ -10,6 +10,8 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
+#include <vector>
 
 namespace voxelpipe::core {
 
@@ -33,6 +35,19 @@ template <class Draw, class Payload>
             return cpu::list_solid(how, backend, sweep, draws, g, lists, result);
         });
     });
+}
+
+// Implements diagnose_repair, with validated arguments: lids on all holes of each body. Throws std::bad_alloc, or
+// std::length_error for more boundary vertices than triangles can name.
+template <class Draw>
+[[nodiscard]] std::vector<hole_cones> run_module(find_holes_tag, const cpu_backend& backend,
+                                                 std::span<const Draw> draws, const grid& g, bodies each) {
+    solid_options options;
+    options.bodies = each;
+    solid_counters counts;
+    cpu::solid_geometry s = cpu::make_solid_geometry(backend.execution(), draws, g, glm::ivec3(0), options);
+    (void)cpu::add_cones(s, options, counts); // more lids than can be drawn may still be measured
+    return std::move(s.cones);
 }
 
 } // namespace voxelpipe::core

@@ -22,7 +22,7 @@ CPP = {
                      "In the paper: frame-buffer types, multiple render targets, blending modes, programmable ROP.",
                      ["framebuffer.hpp", "blend.hpp", "core/layout.hpp", "core/value_traits.hpp", "core/half.hpp", "host_target.hpp"]),
     "abuffers": ("A-buffers", "Every fragment of every voxel. In the paper: A-buffer and bucketing.", ["abuffer.hpp"]),
-    "solids": ("Solids", "The inside of meshes.", ["solid/solid.hpp", "solid/core/crossing.hpp"]),
+    "solids": ("Solids", "The inside of meshes.", ["solid/solid.hpp", "solid/diagnose_repair.hpp", "solid/core/crossing.hpp"]),
     "sparse": ("Sparse grids", "Memory in proportion to the voxels that are drawn: bricks, octrees, files.",
                ["sparse/sparse.hpp", "sparse/host_sparse.hpp", "sparse/sparse_merge.hpp", "core/brick_table.hpp", "core/brick_tile.hpp", "sparse/brick_lookup.hpp", "sparse/octree.hpp", "core/octree_view.hpp",
                 "levels/reducers.hpp", "sparse/octree_dag.hpp", "sparse/backend_octree.hpp", "sparse/backend_octree_dag.hpp", "core/octree_dag_view.hpp", "sparse/io/nanovdb.hpp"]),

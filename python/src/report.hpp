@@ -73,7 +73,7 @@ template <class T>
     options.rule = named<fill_rule>(
         "fill", fill,
         {{"nonzero", fill_rule::nonzero}, {"even_odd", fill_rule::even_odd}, {"positive", fill_rule::positive}});
-    options.extent = named<solid_extent>(
+    const auto extent_named = named<solid_extent>(
         "extent", extent,
         {{"outer", solid_extent::outer}, {"centre", solid_extent::centre}, {"inner", solid_extent::inner}});
     options.repair = named<repair>("repair", repair_name,
@@ -81,6 +81,16 @@ template <class T>
                                     {"close_holes", repair::close_holes},
                                     {"exterior", repair::exterior},
                                     {"vote", repair::vote}});
+    if (options.repair == repair::exterior || options.repair == repair::vote) {
+        // They have an inside of their own, so the module's defaults are the library's.
+        if (options.rule != fill_rule::nonzero)
+            throw nb::value_error(("repair='" + repair_name + "' knows no fill rule: leave fill out").c_str());
+        if (extent_named != solid_extent::outer)
+            throw nb::value_error(
+                ("repair='" + repair_name + "' always has the extent 'outer': leave extent out").c_str());
+    } else {
+        options.extent = extent_named;
+    }
     options.bodies = named<bodies>("bodies", bodies_name, {{"all", bodies::call}, {"each", bodies::draw}});
     if (max_hole_edges) options.max_hole_edges = *max_hole_edges;
     options.closing = closing;
@@ -96,6 +106,20 @@ template <class T>
     d["hole_edges"] = s.solid.hole_edges;
     d["holes"] = s.solid.holes;
     d["cones"] = s.solid.cones;
+    return d;
+}
+
+// What diagnose_repair found.
+[[nodiscard]] inline nb::dict report_flood(const status& s) {
+    (void)report(s); // throws where the call failed
+    nb::dict d;
+    d["lost_voxels"] = s.solid.flood.lost_voxels;
+    d["enclosed_voxels"] = s.solid.flood.enclosed_voxels;
+    d["face_voxels"] = s.solid.flood.face_voxels;
+    d["entered_holes"] = s.solid.flood.entered_holes;
+    d["hole_width"] = s.solid.flood.hole_width;
+    d["tried_closing"] = s.solid.flood.closing;
+    d["tried_close_holes"] = s.solid.flood.close_holes;
     return d;
 }
 

@@ -3,6 +3,7 @@
 #include "arrays.hpp"
 #include "parts.hpp"
 
+#include <voxelpipe/solid/diagnose_repair.hpp>
 #include <voxelpipe/solid/solid.hpp>
 
 #include <optional>
@@ -34,12 +35,32 @@ nb::dict solid_mask(const position_array& positions, const triangle_array& trian
     return report_solid(s);
 }
 
+// What the flood of repair "exterior" does, whether or not the solid was drawn so.
+nb::dict diagnose_repair_of(const position_array& positions, const triangle_array& triangles,
+                            const std::vector<std::uint64_t>& first_triangles, const grid& g,
+                            const std::string& bodies_name, int closing, unsigned threads) {
+    const solid_options options =
+        solid_options_named("nonzero", "outer", "exterior", bodies_name, std::nullopt, closing);
+    using shader = decltype(constant(true));
+    const auto draws = draws_of_parts<draw<mesh_view<>, passthrough, shader>>(view_of(positions, triangles),
+                                                                              first_triangles, constant(true));
+    status s;
+    {
+        const nb::gil_scoped_release released;
+        cpu_backend backend{threads};
+        s = diagnose_repair(backend, draws, g, options);
+    }
+    return report_flood(s);
+}
+
 } // namespace
 
 void bind_solid(nb::module_& m) {
     m.def("solid_mask", &solid_mask, nb::arg("positions"), nb::arg("triangles"), nb::arg("first_triangles"),
           nb::arg("grid"), nb::arg("fill"), nb::arg("extent"), nb::arg("repair"), nb::arg("bodies"),
           nb::arg("max_hole_edges").none(), nb::arg("closing"), nb::arg("out"), nb::arg("threads"));
+    m.def("diagnose_repair", &diagnose_repair_of, nb::arg("positions"), nb::arg("triangles"),
+          nb::arg("first_triangles"), nb::arg("grid"), nb::arg("bodies"), nb::arg("closing"), nb::arg("threads"));
 }
 
 } // namespace voxelpipe::python

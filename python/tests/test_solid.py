@@ -71,6 +71,102 @@ def test_exterior_fills_cavities():
     assert vp.solid(both, grid, repair="exterior").sum() == vp.solid(both[0], grid).sum()
 
 
+def without_faces(mesh, count, direction=(0.5, 0.6, 0.7)):
+    """Without the faces that lie furthest in a direction."""
+    v, f = mesh
+    order = np.argsort(-(v[f].mean(axis=1) @ np.asarray(direction)), kind="stable")
+    return v, f[np.sort(order[count:])]
+
+
+def volume_of(inside, grid):
+    return float(inside.sum() * np.prod(grid.voxel_size))
+
+
+@pytest.mark.parametrize("size", [32, 48])
+def test_exterior_of_a_sphere_without_forty_faces_says_what_it_lost_and_names_what_keeps_it(size):
+    whole = sphere(levels=4)
+    mesh = without_faces(whole, 40)
+    grid = vp.fit(mesh, size)
+    truth = vp.solid(whole, grid, extent="inner")
+    status = {}
+    with pytest.warns(vp.OpenMeshWarning, match="came in by 1 hole of the mesh, of up to [0-9]+ voxels") as caught:
+        emptied = vp.solid(mesh, grid, repair="exterior", status=status)
+    assert volume_of(emptied & truth, grid) < 0.1 * volume_of(truth, grid)
+    assert status["open_rows"] == 0 and status["lost_voxels"] > 0.9 * truth.sum()
+    assert status["entered_holes"] == 1 and status["enclosed_voxels"] == 0
+    # The hole is a cap of 40 of 2048 faces: 2 sin(acos(1 - 2 * 40 / 2048)) of the radius across.
+    across = 2 * np.sin(np.arccos(1 - 80 / 2048)) * size / 2
+    assert 0.6 * across < status["hole_width"] < 1.4 * across + 2
+    closing = status["tried_closing"]
+    message = str(caught[0].message)
+    assert len(caught) == 1 and f"closing={closing}" in message and 'repair="close_holes"' in message
+    assert str(status["lost_voxels"]) in message and f'{status["hole_width"]} voxels' in message
+    # What it names does as it says, and is silent.
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for options in ({"repair": "exterior", "closing": closing}, {"repair": "close_holes"}):
+            kept = vp.solid(mesh, grid, **options, status=status)
+            assert volume_of(kept & truth, grid) > 0.95 * volume_of(truth, grid)
+    assert status["open_rows"] == 0
+
+
+def test_open_mesh_warning_names_what_was_tried_and_helps():
+    grid = vp.Grid((0, 0, 0), (1, 1, 1), (36, 36, 36))
+    whole = sphere(radius=15.0, centre=(18.1, 18.2, 18.3), levels=4)
+    mesh = without_faces(whole, 40)
+    truth = vp.solid(whole, grid, extent="inner")
+
+    def message(mesh, **options):
+        with pytest.warns(vp.OpenMeshWarning) as caught:
+            vp.solid(mesh, grid, **options)
+        assert len(caught) == 1
+        return str(caught[0].message)
+
+    text = message(mesh)
+    closing = int(text.split('repair="exterior", closing=')[1].split()[0])
+    for options in ({"repair": "exterior", "closing": closing}, {"repair": "close_holes"}):
+        assert f'repair="{options["repair"]}"' in text
+        assert (vp.solid(mesh, grid, **options) & truth).sum() > 0.95 * truth.sum()
+    # A crack: the flood does not come in, and needs no closing.
+    cracked = (whole[0] * [1, 1, 1], np.delete(whole[1], 1000, axis=0))
+    fine = vp.Grid((0, 0, 0), (3, 3, 3), (12, 12, 12))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        vp.solid(cracked, fine, repair="exterior")
+    assert not caught
+    assert "tried" not in message(mesh, diagnose=False)
+    assert 'close_holes" without max_hole_edges' in message(mesh, repair="close_holes", max_hole_edges=3)
+    # A sheet encloses nothing, whatever is done: no flood is recommended.
+    sheet = (np.array([[5, 5, 5], [5, 30, 5], [5, 5, 30]], np.float32), np.array([[0, 1, 2]], np.uint32))
+    assert "exterior" not in message(sheet)
+
+
+def test_exterior_refuses_a_grid_within_the_mesh_and_says_where_the_mesh_leaves_it():
+    mesh = sphere(radius=15.0, centre=(18, 18, 18), levels=3)
+    whole = vp.Grid((0, 0, 0), (1, 1, 1), (36, 36, 36))
+    crop = vp.solid(mesh, whole, repair="exterior")[:, :, :18]
+    with pytest.raises(ValueError, match="crop without whole"):
+        vp.solid(mesh, vp.Grid((14, 14, 14), (1, 1, 1), (8, 8, 8)), repair="exterior")
+    status = {}
+    with pytest.warns(vp.OpenMeshWarning, match="where the mesh leaves the grid"):
+        half = vp.solid(mesh, vp.Grid((0, 0, 0), (1, 1, 1), (36, 36, 18)), repair="exterior", status=status)
+    assert status["face_voxels"] == status["lost_voxels"] == (crop & ~half).sum() > 4000
+    assert status["entered_holes"] == status["tried_closing"] == 0
+    outside = vp.Grid((40, 40, 40), (1, 1, 1), (8, 8, 8))
+    assert not vp.solid(mesh, outside, repair="exterior").any()
+
+
+@pytest.mark.parametrize("repair", ["exterior", "vote"])
+def test_repairs_with_an_inside_of_their_own_refuse_a_rule_and_an_extent(repair):
+    mesh = box()
+    grid = vp.fit(mesh, 8)
+    for options in ({"fill": "even_odd"}, {"fill": "positive"}, {"extent": "centre"}, {"extent": "inner"}):
+        with pytest.raises(ValueError, match=next(iter(options))):
+            vp.solid(mesh, grid, repair=repair, **options)
+        vp.solid(mesh, grid, repair="close_holes", **options)
+    assert vp.solid(mesh, grid, repair=repair, fill="nonzero", extent="outer").all()
+
+
 def test_bad_options():
     mesh = box()
     grid = vp.fit(mesh, 8)

@@ -278,6 +278,14 @@ def solid(m: DeviceMesh, grid: Grid, options: Sequence[Any]) -> tuple[Any, dict[
     return m.library.as_bool(out), counts
 
 
+def diagnose_repair(m: DeviceMesh, grid: Grid, bodies: str, closing: int) -> dict[str, int]:
+    stream, positions, triangles, state, _positions = m.call(grid)
+    counts: dict[str, int] = _module().diagnose_repair(
+        stream, positions, triangles, list(m.first_triangles), state, bodies, closing
+    )
+    return counts
+
+
 def _passes(columns: int, is_integer: bool) -> list[tuple[int, int]]:
     """(first column, number of columns) of each pass: up to 3 floats, or one integer."""
     step = 1 if is_integer else 3

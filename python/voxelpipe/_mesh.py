@@ -12,6 +12,7 @@ import numpy as np
 
 from ._core import Grid
 from ._device import DeviceMesh, as_device_mesh, is_on_device
+from ._inputs import load
 
 # Types that functions take as a mesh; see as_mesh.
 MeshLike = Any
@@ -115,14 +116,6 @@ def _triangles(a: Any) -> np.ndarray:
     return np.ascontiguousarray(t, dtype=np.uint32)
 
 
-def _from_path(path: str) -> tuple[Any, Any]:
-    try:
-        import trimesh
-    except ImportError:
-        raise ImportError("reading a model from a path needs trimesh: pip install trimesh") from None
-    return _parts_of(trimesh.load_mesh(path, process=False))
-
-
 def _pyvista(mesh: Any) -> tuple[Any, Any]:
     surface = mesh if mesh.is_all_triangles else mesh.triangulate()
     return surface.points, np.asarray(surface.faces).reshape(-1, 4)[:, 1:]
@@ -131,7 +124,7 @@ def _pyvista(mesh: Any) -> tuple[Any, Any]:
 def _parts_of(mesh: MeshLike) -> tuple[Any, Any]:
     """(vertices, triangles) of one mesh, as the caller's arrays."""
     if isinstance(mesh, (str, os.PathLike)):
-        return _from_path(os.fspath(mesh))
+        return _parts_of(load(os.fspath(mesh)))
     if isinstance(mesh, tuple) and len(mesh) == 2:
         return mesh
     if hasattr(mesh, "geometry") and hasattr(mesh, "graph"):  # a scene of trimesh

@@ -7,12 +7,13 @@ from __future__ import annotations
 import os
 import struct
 import zlib
-from typing import Any
+from typing import Any, Iterable, Mapping
 
 import numpy as np
 
 from . import _core
 from ._core import Grid
+from ._inputs import refuse_input
 from ._listed import is_list, listed, named, occupied_of
 from ._mesh import to_numpy
 from ._view import view
@@ -90,8 +91,32 @@ def _nvdb_values(name: str, a: np.ndarray) -> np.ndarray | None:
     return np.ascontiguousarray(rows)
 
 
+def _refuse_mapped(path: str, values: Any) -> None:
+    """Raises ValueError if an array of the values lies in this file (numpy.memmap)."""
+    parts = values.values() if isinstance(values, Mapping) else values if isinstance(values, tuple) else [values]
+    for part in parts:
+        if isinstance(part, (Mapping, tuple)):
+            _refuse_mapped(path, part)
+        while part is not None:
+            file = getattr(part, "filename", None)
+            if isinstance(part, np.memmap) and file is not None and os.path.exists(file) and os.path.samefile(file, path):
+                raise ValueError(f"{path} holds an array that is being saved; give another name")
+            part = getattr(part, "base", None)
+
+
+def _check_names(path: str, arrays: Iterable[str], own: Iterable[str]) -> None:
+    """Raises ValueError for an array of a .npz with a name that is taken, so that one would replace the other."""
+    for name in arrays:
+        if name in own:
+            raise ValueError(f"{path}: {name!r} is the name of an array that save() adds; give another name")
+        if name in ("file", "allow_pickle"):
+            raise ValueError(f"{path}: numpy writes no array with the name {name!r}; give another name")
+
+
 def save(path: str | os.PathLike[str], values: Any, grid: Grid, *, occupied: Any = None, **options: Any) -> None:
-    """Writes voxels to a file, as its name ends. The file appears whole or not at all.
+    """Writes voxels to a file, as its name ends. The file appears whole or not at all. A file that a model was read from in
+    this process (the path of a mesh, and what that file names), or that holds one of the values (numpy.memmap), is not
+    replaced: ValueError.
 
     .npy: one array, as it is. .npz: the arrays by name, with origin and voxel_size. .nvdb (NanoVDB): the occupied
     voxels with their values, a grid for each name. .png: a picture, with the parameters of render(). .html: a page, with those
@@ -106,6 +131,9 @@ def save(path: str | os.PathLike[str], values: Any, grid: Grid, *, occupied: Any
         raise ValueError(f"{name}: the formats are {', '.join(FORMATS)}; the voxelize tool has more")
     if options and extension not in (".png", ".html"):
         raise TypeError(f"{', '.join(options)}: for .png and .html only")
+    refuse_input(name)
+    if os.path.exists(name):
+        _refuse_mapped(name, values)
     temporary = f"{name}.{os.getpid()}.part"
     try:
         if extension == ".nvdb":
@@ -118,7 +146,11 @@ def save(path: str | os.PathLike[str], values: Any, grid: Grid, *, occupied: Any
             with open(temporary, "wb") as f:
                 f.write(png_bytes(render(values, grid, occupied=occupied, **options)))
         else:
-            arrays = {"coords": to_numpy(values[0], "voxels"), **named(values[1])} if is_list(values) else named(values)
+            coords = {"coords": to_numpy(values[0], "voxels")} if is_list(values) else {}
+            arrays = named(values[1] if is_list(values) else values)
+            if extension == ".npz":
+                _check_names(name, arrays, ("origin", "voxel_size", *coords))
+            arrays = {**coords, **arrays}
             with open(temporary, "wb") as f:
                 if extension == ".npz":
                     np.savez_compressed(f, origin=grid.origin, voxel_size=grid.voxel_size, **arrays)  # type: ignore[arg-type]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ._core import Grid
+from ._inputs import refuse_input
 from ._listed import listed
 
 
@@ -27,6 +28,7 @@ class View:
         return f'<iframe srcdoc="{html.escape(self.html)}" width="100%" height="480" style="border:0"></iframe>'
 
     def save(self, path: str) -> None:
+        refuse_input(str(path))
         pathlib.Path(path).write_text(self.html, encoding="utf-8")
 
 

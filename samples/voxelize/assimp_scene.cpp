@@ -67,7 +67,9 @@ scene load_by_assimp(std::span<const std::byte> bytes, const std::string& name, 
         throw;
     }
     memory.charge(reply.size(), 1, "the model");
-    return to_scene(assimp::from_bytes(reply), read_file, memory, options, hooks);
+    assimp::model source = assimp::from_bytes(reply);
+    assimp::name_files(source, options);
+    return to_scene(std::move(source), read_file, memory, options, hooks);
 }
 
 scene load_by_assimp(const std::filesystem::path& file, const gltf_limits& limits, const gltf_options& options,

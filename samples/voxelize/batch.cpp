@@ -7,7 +7,9 @@
 #include "memory.hpp"
 #include "model_error.hpp"
 #include "named_files.hpp"
+#include "output_check.hpp"
 #include "run_model.hpp"
+#include "run_outputs.hpp"
 
 #include <nlohmann/json.hpp>
 #include <zlib.h>
@@ -28,6 +30,7 @@
 #include <fstream>
 #include <iostream>
 #include <map>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <string_view>
@@ -102,7 +105,8 @@ json record_of(const listed_model& model, const std::string& work) {
 }
 
 // In the process of a model: does the work, sends the record through OUT.
-[[noreturn]] void run_child(const command_line& all, const listed_model& model, const std::string& work, int out) {
+[[noreturn]] void run_child(const command_line& all, const listed_model& model, const std::string& work,
+                            output_check* known, int out) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     const auto begin = clock::now();
     command_line options = all;
@@ -121,7 +125,7 @@ json record_of(const listed_model& model, const std::string& work) {
         if (options.voxelize.threads == 0)
             options.voxelize.threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency() / jobs));
         options.write.threads = options.voxelize.threads;
-        result = run_model(options, begin);
+        result = run_model(options, begin, known);
         record["outputs"] = json::array();
         for (const fs::path& file : result.report.files) {
             const content c = content_of(file);
@@ -133,7 +137,7 @@ json record_of(const listed_model& model, const std::string& work) {
         result.code = exit_output;
         result.error = error.what();
     }
-    record["status"] = name_of(result.code);
+    record["status"] = result.is_conflict ? name_of(exit_output) : name_of(result.code);
     if (result.code != exit_ok) {
         record.erase("outputs");
         record["error"] = result.error;
@@ -159,6 +163,9 @@ json record_of(const listed_model& model, const std::string& work) {
 // The processes of models.
 class workers {
 public:
+    // known: what all models read and write, as run_model() takes it.
+    explicit workers(output_check* known) : known_(known) {}
+
     struct job {
         listed_model model;
         std::string work;
@@ -174,7 +181,7 @@ public:
         if (process < 0) throw std::runtime_error(std::string("no further process: ") + std::strerror(errno));
         if (process == 0) {
             close(ends[0]);
-            run_child(options, model, work, ends[1]);
+            run_child(options, model, work, known_, ends[1]);
         }
         close(ends[1]);
         jobs_.push_back({std::move(model), std::move(work), process, ends[0], {}});
@@ -213,6 +220,7 @@ public:
     }
 
 private:
+    output_check* known_;
     std::vector<job> jobs_;
 };
 
@@ -232,6 +240,44 @@ std::vector<listed_model> models_of(const fs::path& file) {
         throw model_error("cannot read the list " + (is_stdin ? "on standard input" : '\'' + file.string() + '\'') +
                           ": " + error.what());
     }
+}
+
+// Compares the files that all models of the list write with those that the run reads. own_manifest: of this rank.
+// Throws output_conflict.
+output_check check_list(const command_line& options, const std::vector<listed_model>& models, const fs::path& folder,
+                        const fs::path& own_manifest, const finished_models& finished) {
+    output_check check(options.outputs);
+    if (options.batch.list != "-")
+        check.add_input(options.batch.list, "the list '" + options.batch.list.string() + "'");
+    for (const listed_model& model : models) check.add_input(model.input, "the model '" + model.input.string() + "'");
+    for (const fs::path& path : manifests_in(folder))
+        if (path != own_manifest) check.add_input(path, "the manifest '" + path.string() + "'");
+    check.add_output(own_manifest, {{own_manifest}, {}});
+
+    held_as held = held_as::unknown;
+    if (options.storage != storage_choice::automatic)
+        held = options.storage == storage_choice::sparse ? held_as::list : held_as::grid;
+    voxelize_request request = options.voxelize;
+    request.grid.extent = glm::ivec3(0);
+    const std::unordered_set<std::string> own = finished.files();
+    bool has_others =
+        false; // files that are there and may be another model's: pictures, or not of a run over this list
+    for (const listed_model& model : models)
+        for (const fs::path& pattern : options.outputs) {
+            const fs::path output = with_name(pattern, model.name);
+            const written_names names = names_of_output(options, request, output, held);
+            check.add_output(output, names);
+            const bool is_picture = lower_extension(output) == ".png";
+            for (const fs::path& file : names.files) {
+                std::error_code error;
+                has_others = has_others || ((is_picture || !own.contains(file.string())) && fs::exists(file, error));
+            }
+        }
+    // The files that models name are looked for only where an output may be one of them.
+    if (has_others)
+        for (const listed_model& model : models)
+            for (const fs::path& file : named_files(model.input)) check.add_named(file, model.input);
+    return check;
 }
 
 } // namespace
@@ -314,11 +360,19 @@ fs::path manifest_folder(const fs::path& output) {
 int run_batch(const command_line& options) {
     const std::vector<listed_model> models = models_of(options.batch.list);
     const fs::path folder = manifest_folder(options.outputs.front());
-    const manifest records(folder / ("manifest." + std::to_string(options.batch.rank) + ".jsonl"));
+    const fs::path own_manifest = folder / ("manifest." + std::to_string(options.batch.rank) + ".jsonl");
     const finished_models finished(folder);
+    std::optional<output_check> known = check_list(options, models, folder, own_manifest, finished);
+    // Names that only the grid of a model tells, of meshes in several files, are compared once it is known.
+    const bool may_split = std::any_of(options.outputs.begin(), options.outputs.end(), [](const fs::path& output) {
+        const std::string extension = lower_extension(output);
+        return extension == ".obj" || extension == ".ply" || extension == ".glb";
+    });
+    if (!may_split) known.reset();
+    const manifest records(own_manifest);
 
     std::size_t mine = 0, skipped = 0, done = 0, failed = 0;
-    workers running;
+    workers running(known ? &*known : nullptr);
     const auto wait = [&] {
         running.wait([&](const workers::job& job, const json& record) {
             records.add(record);

@@ -61,12 +61,18 @@ void manifest::fail(const char* action) const {
     throw std::runtime_error("cannot " + std::string(action) + " '" + path_.string() + "': " + std::strerror(errno));
 }
 
-finished_models::finished_models(const fs::path& folder) {
+std::vector<fs::path> manifests_in(const fs::path& folder) {
+    std::vector<fs::path> paths;
     std::error_code error;
     for (const fs::directory_entry& entry : fs::directory_iterator(folder.empty() ? fs::path(".") : folder, error)) {
         const std::string name = entry.path().filename().string();
-        if (name.starts_with("manifest.") && name.ends_with(".jsonl")) read(entry.path());
+        if (name.starts_with("manifest.") && name.ends_with(".jsonl")) paths.push_back(folder / name);
     }
+    return paths;
+}
+
+finished_models::finished_models(const fs::path& folder) {
+    for (const fs::path& path : manifests_in(folder)) read(path);
 }
 
 void finished_models::read(const fs::path& path) {
@@ -100,6 +106,13 @@ bool finished_models::has(const listed_model& model, const std::string& work) co
         if (fs::is_directory(file.first, error)) return true;
         return fs::file_size(file.first, error) == file.second && !error;
     });
+}
+
+std::unordered_set<std::string> finished_models::files() const {
+    std::unordered_set<std::string> all;
+    for (const auto& [name, known] : works_)
+        for (const auto& [file, bytes] : known.files) all.insert(file);
+    return all;
 }
 
 } // namespace voxelize

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -34,12 +35,18 @@ private:
     int file_ = -1;
 };
 
+// The manifests of all ranks.
+[[nodiscard]] std::vector<std::filesystem::path> manifests_in(const std::filesystem::path& folder);
+
 // The latest record of each name in the manifests of all ranks, if it says ok and its files are there.
 class finished_models {
 public:
     explicit finished_models(const std::filesystem::path& folder);
     // True if this work was the last on the model's outputs.
     [[nodiscard]] bool has(const listed_model& model, const std::string& work) const;
+
+    // The files of all records, which are this tool's own.
+    [[nodiscard]] std::unordered_set<std::string> files() const;
 
 private:
     struct known_model {

@@ -183,6 +183,7 @@ struct open_document {
         materials.read_factors();
         shown = gltf::shown_meshes(model, accessors, tolerance);
         tolerance.finish();
+        gltf::name_files(document, options);
     }
     open_document(const open_document&) = delete;
     open_document& operator=(const open_document&) = delete;

@@ -35,6 +35,7 @@ void load(scene& result, std::span<const std::byte> bytes, const gltf_file_reade
     const gltf::container parts = gltf::split_container(bytes, tolerance);
     const gltf::checked_document document =
         gltf::check_document(parts.json, parts.has_binary, memory, tolerance, options);
+    gltf::name_files(document, options);
     const gltf::resources resources{document, parts.binary, parts.has_binary, read_file, memory, tolerance};
     tinygltf::Model model = gltf::parse(document);
     const gltf::accessor_reader accessors{model, document, resources, memory};

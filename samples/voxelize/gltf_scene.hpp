@@ -63,6 +63,9 @@ struct gltf_options {
     // Reads roughness, metal and emission too, for programs that light the model. Textures with coordinates other than
     // the base colour's are left out, with a warning.
     bool shading = false;
+    // Called with each file that the model names, by its path relative to the model's folder, whether it is read or
+    // not, and more than once for some. Of an OBJ these are material libraries and pictures. May be empty.
+    std::function<void(const std::filesystem::path& relative)> names_file{};
 };
 
 // Gives the bytes of a file that a .gltf names. The path is relative, normalised, percent-decoded and never leaves

@@ -6,6 +6,7 @@
 #include "exit_code.hpp"
 #include "memory.hpp"
 #include "model_error.hpp"
+#include "output_check.hpp"
 #include "run_model.hpp"
 
 #include <chrono>
@@ -56,6 +57,8 @@ int run_main(int argc, char** argv) {
     if (!options.batch.list.empty()) {
         try {
             return run_batch(options);
+        } catch (const output_conflict& error) {
+            return fail(exit_usage, error.what());
         } catch (const model_error& error) {
             return fail(exit_input, error.what());
         } catch (const std::exception& error) {

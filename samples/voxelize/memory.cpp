@@ -23,6 +23,7 @@ std::atomic<std::uint64_t> allowed{UINT64_MAX}; // that they may reach: the limi
 std::atomic<std::uint64_t> overhead{0};         // what else is resident, when it was measured last
 std::atomic<std::uint64_t> unmeasured{0};       // bytes that were taken since then
 std::atomic<std::uint64_t> wanted{0};           // counted bytes of the last refusal; 0: there was none
+std::atomic<double> expected{0};                // bytes in all that the run was said to come to
 std::uint64_t limit_bytes = UINT64_MAX;
 bool limit_is_option = false;
 
@@ -59,8 +60,10 @@ void measure_overhead() noexcept {
     unmeasured = 0;
     const residence now = residence_now();
     const std::uint64_t rest = std::max(difference(now.all, counted), now.of_files + data_of_libraries + heap_bytes());
-    overhead = rest;
-    if (limit_bytes != UINT64_MAX) allowed = difference(limit_bytes, rest);
+    // What comes between two looks.
+    constexpr std::uint64_t reserve = std::uint64_t{512} << 10;
+    overhead = rest + reserve;
+    if (limit_bytes != UINT64_MAX) allowed = difference(limit_bytes, rest + reserve);
 }
 
 // The number in FILE; the greatest where there is none ("max").
@@ -76,7 +79,9 @@ std::string limit_text() {
 }
 
 std::string need_text(double least, double likely) {
-    return (likely > least ? "about " : "at least ") + mebibytes(std::max(least, likely)) + " are needed";
+    constexpr double spare = 1.5 * (1 << 20); // an estimate is to suffice
+    return likely > least ? "about " + mebibytes(likely + spare) + " are needed"
+                          : "at least " + mebibytes(least) + " are needed";
 }
 
 std::string with(const std::string& hint) { return hint.empty() ? hint : ": " + hint; }
@@ -142,15 +147,30 @@ bool take(std::size_t bytes) noexcept {
 
 void give_back(std::size_t bytes) noexcept { counted -= bytes; }
 
+bool take_small(std::size_t bytes) noexcept {
+    measure_overhead();
+    const std::uint64_t now = counted;
+    if (limit_bytes == UINT64_MAX || now + overhead <= limit_bytes) return true;
+    wanted = now + bytes;
+    return false;
+}
+
 void refused(std::size_t bytes) noexcept { wanted = counted + bytes; }
 
 void require(double bytes, const std::string& what, const std::string& hint, double likely) {
     if (bytes <= static_cast<double>(room())) return;
     const auto held = static_cast<double>(counted + overhead);
-    throw memory_error(what + ": " + need_text(held + bytes, held + likely) + ", and " + limit_text() + with(hint));
+    throw memory_error(what + ": " + need_text(held + bytes, std::max<double>(held + likely, expected)) + ", and " +
+                       limit_text() + with(hint));
+}
+
+void expect(double bytes) {
+    (void)room(); // measures
+    expected = static_cast<double>(counted + overhead) + bytes;
 }
 
 std::string shortage(const std::string& hint, double likely) {
+    likely = std::max<double>(likely, expected);
     const double held = static_cast<double>(overhead) + static_cast<double>(wanted != 0 ? wanted : counted);
     const std::string need = wanted != 0 ? need_text(held, likely) : "the system gave no more than " + mebibytes(held);
     return "not enough memory: " + need + ", and " + limit_text() + with(hint);

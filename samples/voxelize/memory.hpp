@@ -22,6 +22,8 @@ namespace memory {
 
 // Blocks below this many bytes are not counted one by one.
 inline constexpr std::size_t counted_block = std::size_t{64} << 10;
+// Each thread has the process measured after this many bytes of such blocks.
+inline constexpr std::size_t measured_after = std::size_t{256} << 10;
 
 // Bytes that this process may use if it is not told otherwise: nine tenths of the machine's memory, of its control
 // group's limit or of its own limit of address space, whichever is least.
@@ -42,12 +44,17 @@ void set_limit(std::uint64_t limit, bool is_option);
 // without being counted.
 [[nodiscard]] bool take(std::size_t bytes) noexcept;
 void give_back(std::size_t bytes) noexcept;
+// The same for small blocks of BYTES together, which are not counted: false where the process is past the limit.
+[[nodiscard]] bool take_small(std::size_t bytes) noexcept;
 // For operator new: the system had no BYTES more.
 void refused(std::size_t bytes) noexcept;
 
 // Throws memory_error where WHAT, which needs at least BYTES more than are held now, does not fit. LIKELY: what it will
 // come to, more or less, to be named. HINT follows the figures.
 void require(double bytes, const std::string& what, const std::string& hint = "", double likely = 0);
+
+// The run will come to so many BYTES more than are held now, about: later shortages name that much.
+void expect(double bytes);
 
 // The message for a std::bad_alloc: the need as far as it is known, LIKELY in all where that is more, and the limit.
 // HINT follows the figures.

@@ -6,8 +6,10 @@
 
 #include <malloc.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <new>
+#include <utility>
 
 // Thread sanitizer has operators of its own that no program can replace: the budget is not kept there.
 #if defined(__has_feature)
@@ -22,13 +24,23 @@
 #ifndef VOXELIZE_KEEPS_OPERATORS
 namespace {
 
+// Bytes of small blocks that this thread has taken since the process was measured, less those that it gave back.
+thread_local std::size_t small_bytes = 0;
+
+// Many small blocks without a large one between them would grow past the limit without a look at it.
+bool take(std::size_t size) noexcept {
+    if (size >= voxelize::memory::counted_block) return voxelize::memory::take(size);
+    small_bytes += size;
+    if (small_bytes < voxelize::memory::measured_after) return true;
+    return voxelize::memory::take_small(std::exchange(small_bytes, 0));
+}
+
 void* guarded(void* block, std::size_t wanted) {
     if (block == nullptr) {
         voxelize::memory::refused(wanted);
         throw std::bad_alloc{};
     }
-    const std::size_t size = malloc_usable_size(block);
-    if (size >= voxelize::memory::counted_block && !voxelize::memory::take(size)) {
+    if (!take(malloc_usable_size(block))) {
         std::free(block);
         throw std::bad_alloc{};
     }
@@ -38,7 +50,10 @@ void* guarded(void* block, std::size_t wanted) {
 void release(void* block) noexcept {
     if (block == nullptr) return;
     const std::size_t size = malloc_usable_size(block);
-    if (size >= voxelize::memory::counted_block) voxelize::memory::give_back(size);
+    if (size >= voxelize::memory::counted_block)
+        voxelize::memory::give_back(size);
+    else
+        small_bytes -= std::min(size, small_bytes);
     std::free(block);
 }
 

@@ -3,6 +3,7 @@
 #include "named_files.hpp"
 
 #include "assimp/file_name.hpp"
+#include "assimp_scene.hpp"
 #include "gltf/resources.hpp"
 #include "model_error.hpp"
 
@@ -84,6 +85,16 @@ void add_obj_files(const fs::path& model, std::vector<fs::path>& files) {
             if (const auto path = assimp::local_file(library)) files.push_back(folder / *path);
     });
     const std::size_t libraries = files.size();
+    for (std::size_t i = 0; i < libraries; ++i) {
+        const std::vector<fs::path> pictures = named_pictures(fs::path(files[i]), folder);
+        files.insert(files.end(), pictures.begin(), pictures.end());
+    }
+}
+
+} // namespace
+
+std::vector<fs::path> named_pictures(const fs::path& library, const fs::path& folder) {
+    std::vector<fs::path> files;
     // A picture's name follows options, and may have blanks; it lies where it says, or beside the model.
     const auto add_picture = [&](const std::string& text) {
         for (std::size_t at = 0; at != std::string::npos; at = text.find_first_not_of(" \t", text.find(' ', at))) {
@@ -95,19 +106,18 @@ void add_obj_files(const fs::path& model, std::vector<fs::path>& files) {
             if (text.find(' ', at) == std::string::npos) break;
         }
     };
-    for (std::size_t i = 0; i < libraries; ++i) {
-        const fs::path library = files[i];
-        for_each_line(library, "map_", add_picture);
-    }
+    for (const char* const key : {"map_", "bump", "disp", "decal", "refl", "norm"})
+        for_each_line(library, key, add_picture);
+    return files;
 }
-
-} // namespace
 
 std::vector<fs::path> named_files(const fs::path& model) {
     std::vector<fs::path> files;
     const std::string extension = assimp::lower_extension(model);
-    if (extension == ".gltf" || extension == ".glb") add_gltf_files(model, files);
-    if (extension == ".obj") add_obj_files(model, files);
+    if (extension == ".obj")
+        add_obj_files(model, files);
+    else if (!is_for_assimp(extension))
+        add_gltf_files(model, files);
     return files;
 }
 

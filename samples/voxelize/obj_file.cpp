@@ -175,6 +175,7 @@ bool obj_file::read_vertices(assimp::obj_outline& outline) {
 
 void obj_file::read_outline(const assimp::obj_outline& outline) {
     assimp::obj_outline::parts found = outline.read(path_);
+    assimp::name_files(found.source, options_);
     materials_ = std::move(found.source.materials);
     warnings_ = std::move(found.source.warnings);
     named_.textures = std::move(found.source.textures);

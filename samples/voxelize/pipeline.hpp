@@ -324,6 +324,11 @@ protected: // sparse_pipeline draws the same into bricks
 
     // The volume's other values, once all bits are there.
     void finish_solid(volume& result);
+    // What the flood of --solid exterior did; and which repairs help an open model, each of which is tried. Does
+    // nothing for a part of the model, and where the bits do not fit into the run's memory. Throws grid_error for
+    // a flood where the grid lies within the model: what is outside follows from the whole.
+    void examine_solid();
+    void examine_solid_bits(const voxelpipe::grid& whole); // in the whole grid
     // `voxels`: of the solid; `surface`: those of them that a triangle touches.
     void warn_of_solid(std::uint64_t voxels, std::uint64_t surface);
 

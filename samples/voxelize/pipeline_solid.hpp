@@ -4,12 +4,18 @@
 // Solids in the tool's pipeline: their bits, slab by slab, and the values of the voxels inside. Part of pipeline.hpp,
 // which includes it.
 
+#include "memory.hpp"
 #include "pipeline.hpp"
+#include "placement.hpp"
+
+#include <voxelpipe/solid/diagnose_repair.hpp>
 
 #include <algorithm>
 #include <bitset>
 #include <cstdint>
+#include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -73,9 +79,58 @@ void pipeline<Backend>::finish_solid(volume& result) {
 }
 
 template <class Backend>
+void pipeline<Backend>::examine_solid() {
+    const solid_request& solid = *request_.solid;
+    solid_counts& counts = *stats_.solid;
+    const bool is_flood = solid.rule == solid_rule::exterior;
+    if (!solid.is_whole || solid.vote || (!is_flood && counts.open_rows == 0)) return;
+    const voxelpipe::grid whole = uploaded_->relative_grid().uncropped();
+    // Some twenty bits a voxel on the host, and one of the backend's.
+    const double words = static_cast<double>(bits_map::elements(whole.extent));
+    if (24 * sizeof(std::uint32_t) * words > static_cast<double>(memory::room())) return;
+    try {
+        examine_solid_bits(whole);
+    } catch (const std::bad_alloc&) { // the solid is there, and nothing is known of it
+    }
+}
+
+template <class Backend>
+void pipeline<Backend>::examine_solid_bits(const voxelpipe::grid& whole) {
+    const solid_request& solid = *request_.solid;
+    solid_counts& counts = *stats_.solid;
+    const bool is_flood = solid.rule == solid_rule::exterior;
+    const stage_timer timer{*this, "examine"};
+    const auto clock = std::exchange(backend_.times, nullptr); // of the solid alone
+    if constexpr (requires { backend_.progress; }) backend_.progress = {};
+    std::bitset<2> enabled;
+    enabled[0] = true;
+    bits_framebuffer& framebuffer = framebuffer_for(solid_framebuffer_, whole.extent, enabled);
+    vp::solid_options how = solid_options_of(solid);
+    if (!is_flood) {
+        how.repair = vp::repair::close_holes;
+        how.max_hole_edges = vp::solid_options{}.max_hole_edges;
+        const vp::status closed = vp::voxelize_solid(backend_, uploaded_->bits_draws(), whole, framebuffer, how);
+        counts.lids_balance = closed.ok() && closed.solid.open_rows == 0;
+        how.closing = 0;
+    }
+    const auto& draws = uploaded_->bits_draws();
+    using draw_type = typename std::remove_cvref_t<decltype(draws)>::value_type;
+    const vp::status status =
+        voxelpipe::diagnose_repair(backend_, std::span<const draw_type>(draws), whole, how, framebuffer);
+    backend_.times = clock;
+    if (status.code == vp::status_code::crop_without_whole && is_flood)
+        throw grid_error("the grid lies within the model, and what --solid exterior makes of it follows from the whole "
+                         "model (" +
+                         status.message() + "): take a grid that holds the model, or --solid nonzero");
+    counts.is_examined = status.ok() || status.code == vp::status_code::crop_without_whole;
+    if (status.ok()) counts.flood = status.solid.flood;
+}
+
+template <class Backend>
 void pipeline<Backend>::warn_of_solid(std::uint64_t voxels, std::uint64_t surface) {
     stats_.voxels = voxels;
     stats_.solid->touched += surface;
+    examine_solid();
     if (std::string warning = flood_warning(*request_.solid, *stats_.solid, voxels); !warning.empty())
         stats_.warnings.push_back(std::move(warning));
     if (std::string warning = open_warning(*request_.solid, *stats_.solid); !warning.empty())

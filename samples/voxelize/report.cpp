@@ -132,6 +132,16 @@ void print_json(std::ostream& stream, const run_report& report) {
                          {"crossings", report.stats.solid->crossings},
                          {"max_winding", report.stats.solid->max_winding}};
         if (report.request.solid->vote) root["solid"]["vote"] = true;
+        if (report.stats.solid->is_examined) {
+            const voxelpipe::flood_counters& flood = report.stats.solid->flood;
+            root["solid"]["flood"] = {{"lost_voxels", flood.lost_voxels},
+                                      {"enclosed_voxels", flood.enclosed_voxels},
+                                      {"face_voxels", flood.face_voxels},
+                                      {"entered_holes", flood.entered_holes},
+                                      {"hole_width", flood.hole_width},
+                                      {"tried_closing", flood.closing},
+                                      {"tried_close_holes", flood.close_holes != 0}};
+        }
         if (report.request.solid->close_holes != 0) {
             root["solid"]["hole_edges"] = report.stats.solid->hole_edges;
             root["solid"]["holes"] = report.stats.solid->holes;

@@ -7,17 +7,21 @@
 #include "memory.hpp"
 #include "model_file.hpp"
 #include "picture_levels.hpp"
+#include "run_outputs.hpp"
 #include "slab_run.hpp"
 #include "sparse/sparse_formats.hpp"
 #include "sparse/sparse_voxelizer.hpp"
 #include "sparse/streamed_model.hpp"
+#include "write_bytes.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <iostream>
 #include <memory>
 #include <new>
 #include <optional>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -98,6 +102,19 @@ scene load_whole(const std::filesystem::path& file, const load_options& options,
     }
 }
 
+// A flood that has not been examined, in a grid that the model leaves.
+void warn_of_part(const bounding_box& bounds, run_report& report) {
+    const voxelize_request& request = report.request;
+    if (!request.solid || request.solid->rule != solid_rule::exterior) return;
+    if (report.stats.solid && report.stats.solid->is_examined) return;
+    const glm::dvec3 first = request.grid.part_origin(),
+                     last = first + glm::dvec3(request.grid.extent) * request.grid.voxel_size;
+    if (!bounding_box{first, last, false}.holds(bounds))
+        report.warnings.push_back(
+            "the model leaves the grid, and the flood of --solid exterior comes in there: what it "
+            "takes is not what it would take of the whole model");
+}
+
 void warn_of_dropped(run_report& report) {
     if (report.stats.triangles_dropped != 0)
         report.warnings.push_back(std::to_string(report.stats.triangles_dropped) +
@@ -105,13 +122,14 @@ void warn_of_dropped(run_report& report) {
 }
 
 // Draws and writes the slabs of this process.
-void run_slabs(const command_line& options, slab_source&& source, run_report& report) {
+void run_slabs(const command_line& options, slab_source&& source, const bounding_box& bounds, run_report& report) {
     report.is_sparse = true;
     const slab_outcome outcome = run_by_slabs(options, std::move(source), report);
     report.warnings.insert(report.warnings.end(), report.stats.warnings.begin(), report.stats.warnings.end());
     warn_of_dropped(report);
+    warn_of_part(bounds, report);
     if (outcome.finished && report.stats.voxels == 0)
-        report.warnings.push_back(why_empty(report.stats, report.request.coverage));
+        report.warnings.push_back(why_empty(report.stats, report.request, bounds.low, bounds.high));
     if (options.quiet) return;
     std::cerr << "voxelize: drew " << outcome.drawn << " of " << outcome.slabs << " slabs";
     if (options.batch.world_size > 1)
@@ -134,10 +152,16 @@ bool is_large(const scene& model) {
     return 8 * bytes > static_cast<double>(memory::limit());
 }
 
+// What else a run reads and writes.
+struct other_files {
+    std::set<std::filesystem::path> named; // by the model, relative to its folder
+    output_check* known = nullptr;         // of a list
+};
+
 // Does the work, with the model as OPENED has it. helps_to_stream: true as long as a shortage of memory may be one that
 // a loaded model makes and a streamed one does not.
-void run(const command_line& options, clock::time_point begin, const opened_stream& opened, run_report& report,
-         bool& helps_to_stream) {
+void run(const command_line& options, clock::time_point begin, const opened_stream& opened, const other_files& others,
+         run_report& report, bool& helps_to_stream) {
     report.input = options.input;
     report.request = options.voxelize;
     progress_bar bar{!options.quiet};
@@ -189,16 +213,35 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
                                  if (!options.quiet) std::cerr << "voxelize: " << how << '\n';
                              }};
     if (options.by_slabs) {
+        check_outputs(options, report.request, others.named, held_as::grid, others.known);
         bar.start("voxelizing slab by slab");
         report.request.progress = [&bar](double done) { bar.show(done); };
-        run_slabs(options, {std::move(model), stream, place}, report);
+        run_slabs(options, {std::move(model), stream, place}, bounds, report);
         bar.clear();
         report.peak_memory = memory::peak();
         add_rest(report, milliseconds_since(begin));
         return;
     }
-    const storage_decision storage =
-        stream ? storage_decision{true, ""} : choose_storage(options.storage, report.request, options.outputs);
+    storage_decision storage{true, true, ""};
+    // Outputs are written one after the other.
+    report.request.write_bytes = [&](double bricks, double voxels, double in_tiles) {
+        double bytes = 0;
+        for (const std::filesystem::path& output : options.outputs)
+            bytes = std::max(bytes, bytes_to_write(output,
+                                                   {report.request.grid.extent, report.request.targets, storage.sparse,
+                                                    bricks, voxels, in_tiles},
+                                                   options.write));
+        return bytes;
+    };
+    if (!stream) {
+        storage.sparse = false;
+        // As it is without the other outputs and what they ask for.
+        voxelize_request alone = report.request;
+        alone.targets.resize(alone.targets.size() - options.implied.size());
+        storage = choose_storage(options.storage, report.request, options.outputs,
+                                 {dense_need(model, report.request), dense_need(model, alone)});
+    }
+    check_outputs(options, report.request, others.named, storage.lists ? held_as::list : held_as::grid, others.known);
     const glm::ivec3 extent = report.request.grid.extent;
     if (!options.quiet && !storage.reason.empty())
         std::cerr << "voxelize: a sparse grid of " << extent.x << " x " << extent.y << " x " << extent.z
@@ -217,11 +260,14 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     const std::uint64_t num_bricks = bricks.keys.size(), brick_bytes = bricks.num_bytes();
     for (const std::string& warning : report.stats.warnings) report.warnings.push_back(warning);
     warn_of_dropped(report);
-    if (report.stats.voxels == 0) report.warnings.push_back(why_empty(report.stats, report.request.coverage));
+    warn_of_part(bounds, report);
+    if (report.stats.voxels == 0)
+        report.warnings.push_back(why_empty(report.stats, report.request, bounds.low, bounds.high));
 
     start = clock::now();
     for (const std::filesystem::path& output : options.outputs) {
         write_options how = options.write;
+        how.lists = storage.lists;
         bar.start("writing " + output.filename().string());
         how.progress = [&bar](double done) { bar.show(done); };
         how.warn = [&report](const std::string& warning) { report.warnings.push_back(warning); };
@@ -247,7 +293,10 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
 
 // Every failure is an exception. Streams a model that does not fit otherwise. How much its pictures take is known only
 // once they are held, and how much drawing takes only by an estimate: one that may fit is loaded first.
-void run_either_way(const command_line& options, clock::time_point begin, run_report& report) {
+void run_either_way(const command_line& given, clock::time_point begin, output_check* known, run_report& report) {
+    other_files others{{}, known};
+    command_line options = given;
+    options.load.gltf.names_file = [&others](const std::filesystem::path& file) { others.named.insert(file); };
     const std::filesystem::path folder = folder_of(options.outputs.front());
     const double options_ms = milliseconds_since(begin);
     report.stats.milliseconds.emplace_back("options", options_ms);
@@ -259,7 +308,7 @@ void run_either_way(const command_line& options, clock::time_point begin, run_re
     };
     std::exception_ptr shortage;
     try {
-        run(options, begin, opened, report, helps_to_stream);
+        run(options, begin, opened, others, report, helps_to_stream);
     } catch (const memory_error&) {
         shortage = keep_for_later();
     } catch (const std::bad_alloc&) {
@@ -270,23 +319,26 @@ void run_either_way(const command_line& options, clock::time_point begin, run_re
     if (!opened.stream) std::rethrow_exception(shortage);
     report = {};
     report.stats.milliseconds.emplace_back("options", options_ms);
-    run(options, begin, opened, report, helps_to_stream);
+    run(options, begin, opened, others, report, helps_to_stream);
 }
 
 } // namespace
 
-run_outcome run_model(const command_line& options, clock::time_point begin) {
+run_outcome run_model(const command_line& options, clock::time_point begin, output_check* known) {
     run_outcome result;
     const auto fail = [&result](exit_code code, const std::string& why) {
         result.code = code;
         result.error = why;
     };
     try {
-        run_either_way(options, begin, result.report);
+        run_either_way(options, begin, known, result.report);
     } catch (const model_error& error) {
         result.report.warnings = error.warnings;
         fail(exit_input, options.input.string() + ": " + error.what() +
                              (error.lenient_helps ? " (--lenient goes on all the same)" : ""));
+    } catch (const output_conflict& error) {
+        result.is_conflict = true;
+        fail(exit_usage, error.what());
     } catch (const grid_error& error) {
         fail(exit_usage, error.what());
     } catch (const memory_error& error) {

@@ -39,11 +39,7 @@ public:
                 static_cast<int>(std::min<std::int64_t>(shape_.extent[2], (slab + 1) * zarr_slab_layers))};
     }
     [[nodiscard]] const fs::path& target() const override { return target_; }
-    void check_target() const override {
-        std::error_code error;
-        if (fs::exists(target_, error) && !fs::exists(target_ / "zarr.json", error))
-            throw write_error(target_, "it exists and is no Zarr group");
-    }
+    void check_target() const override { check_zarr_target(target_); }
     void write(const fs::path& folder, std::int64_t slab, const volume& v) const override {
         write_zarr_slab(v, folder / "data", folder / "levels", slab, options_);
     }

@@ -19,8 +19,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <new>
+#include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -40,14 +42,17 @@ constexpr std::pair<const char*, std::uint64_t voxelize_stats::*> kept_counts[] 
     {"triangles_drawn", &voxelize_stats::triangles_drawn},
     {"normals_cancelled", &voxelize_stats::normals_cancelled}};
 
-// The lock of a folder, which the system takes back from a process that ends in whatever way. On NFS it is the
-// server's, so it holds between hosts. Throws write_error where the file system has no locks.
+// A lock of a folder by the name of its file, which the system takes back from a process that ends in whatever way. On
+// NFS it is the server's, so it holds between hosts. Throws write_error where the file system has no locks.
 class folder_lock {
 public:
-    explicit folder_lock(const fs::path& folder) {
-        const fs::path path = folder / "lock";
+    // say: is called before the lock is waited for, where another process has it. May be empty.
+    explicit folder_lock(const fs::path& folder, const std::string& name = "lock",
+                         const std::function<void()>& say = {}) {
+        const fs::path path = folder / name;
         file_ = ::open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
         int error = file_ < 0 ? errno : 0;
+        if (error == 0 && say && ::flock(file_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) say();
         while (error == 0 && ::flock(file_, LOCK_EX) != 0)
             if (errno != EINTR) error = errno;
         // Who had the lock before may have removed the folder.
@@ -80,22 +85,28 @@ public:
         output_.check_target();
     }
     [[nodiscard]] const fs::path& path() const { return path_; }
+    // The lock of a process's share, which processes of the same rank hold one after the other: from begin() until the
+    // output is made, or until no slab of the share is missing. False if another process has made the output meanwhile.
+    [[nodiscard]] std::unique_ptr<folder_lock> lock_share(const batch_request& share,
+                                                          const std::function<void()>& say) const {
+        make(path_);
+        const std::string name = share_lock + std::to_string(share.rank) + "." + std::to_string(share.world_size);
+        return std::make_unique<folder_lock>(path_, name, say);
+    }
+    [[nodiscard]] bool is_there() const {
+        std::error_code error;
+        return fs::exists(path_, error);
+    }
     // Of these slabs of this process, those that have to be drawn; the folder stays until they are. None if another
     // process makes the output meanwhile.
     [[nodiscard]] std::vector<std::int64_t> begin(const std::vector<std::int64_t>& share) const {
         std::error_code error;
-        if (share.empty() && !fs::exists(path_, error)) return {};
-        const auto make = [&](const fs::path& folder) {
-            fs::create_directories(folder, error);
-            if (error) throw write_error(path_, "make a folder: " + error.message());
-        };
-        make(path_);
         const folder_lock lock(path_);
         if (!lock) return {};
         // Without data its slabs became the output, and the process ended before it could remove the rest.
         if (!has_data())
             for (const fs::directory_entry& entry : fs::directory_iterator(path_, error))
-                if (entry.path().filename() != "lock") fs::remove_all(entry.path(), error);
+                if (!is_lock(entry.path())) fs::remove_all(entry.path(), error);
         make(path_ / "data");
         std::vector<std::int64_t> missing;
         for (const std::int64_t slab : share)
@@ -133,6 +144,16 @@ public:
     }
 
 private:
+    static constexpr const char* share_lock = "process.";
+    [[nodiscard]] static bool is_lock(const fs::path& path) {
+        const std::string name = path.filename().string();
+        return name == "lock" || name.starts_with(share_lock);
+    }
+    void make(const fs::path& folder) const {
+        std::error_code error;
+        fs::create_directories(folder, error);
+        if (error) throw write_error(path_, "make a folder: " + error.message());
+    }
     [[nodiscard]] bool has(std::int64_t slab) const {
         std::error_code error;
         return fs::exists(mark_of(slab), error);
@@ -181,6 +202,19 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
     std::vector<slabs::layer_range> ranges;
     for (std::int64_t s = 0; s < outcome.slabs; ++s) ranges.push_back(output->layers(s));
     for (std::int64_t s = options.batch.rank; s < outcome.slabs; s += options.batch.world_size) share.push_back(s);
+    voxelize_stats& stats = report.stats;
+    const auto count_triangles = [&] {
+        stats.triangles = source.stream != nullptr ? source.stream->num_triangles() : source.model.triangle_count();
+    };
+    std::unique_ptr<folder_lock> lock;
+    if (!share.empty())
+        lock = folder.lock_share(options.batch, [&source] {
+            if (source.place.say) source.place.say("another process draws the same slabs: waiting for its end");
+        });
+    if (lock ? !*lock : !folder.is_there()) { // the output is made, or others make it
+        count_triangles();
+        return outcome;
+    }
     const std::vector<std::int64_t> missing = folder.begin(share);
     const std::vector<std::size_t> mine(missing.begin(), missing.end());
     const pass_files passes(folder.path(),
@@ -188,7 +222,6 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
     voxelize_stats before;
     const auto write = [&](std::size_t i, sparse_volume&& bricks, const voxelize_stats& until) {
         bricks.channels.resize(num_targets);
-        if (!bricks.tiles.empty()) bricks = open_tiles(bricks);
         output->write(folder.path(), missing[i], as_dense(bricks, bricks.channels));
         voxelize_stats counts;
         for (const auto& [name, count] : kept_counts) counts.*count = until.*count - before.*count;
@@ -196,7 +229,6 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
         folder.mark(missing[i], counts);
         ++outcome.drawn;
     };
-    voxelize_stats& stats = report.stats;
     if (source.stream != nullptr && !mine.empty()) {
         draw_streamed(*source.stream, source.place, request, {ranges, mine, &passes}, stats,
                       [&](std::size_t i, sparse_volume&& bricks) { write(i, std::move(bricks), stats); });
@@ -212,10 +244,13 @@ slab_outcome run_by_slabs(const command_line& options, slab_source&& source, run
             throw memory_error(memory::shortage(memory::fewer_voxels_hint));
         }
     } else {
-        stats.triangles = source.stream != nullptr ? source.stream->num_triangles() : source.model.triangle_count();
+        count_triangles();
     }
     voxelize_stats all;
     std::vector<fs::path> files = folder.finish(all, outcome.left);
+    lock.reset();
+    std::error_code ignored;
+    fs::remove(folder.path(), ignored); // if it is empty: NFS, as above
     if (outcome.left != 0 && options.batch.world_size == 1)
         throw write_error(folder.path(), "slabs that this run has written are gone");
     if (files.empty()) return outcome;

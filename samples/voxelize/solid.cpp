@@ -77,6 +77,24 @@ const char* to_string(solid_extent extent) {
     return names[static_cast<std::size_t>(extent)];
 }
 
+namespace {
+
+// What helps an open model: each option has been tried on it.
+std::string advice(const solid_request& request, const solid_counts& counts) {
+    if (!counts.is_examined) return "No repair was tried on it";
+    std::string helps = counts.lids_balance ? "--close-holes" : "";
+    if (!helps.empty() && request.close_holes != 0) helps += " without a number";
+    if (!helps.empty()) helps += " leaves no such row";
+    const voxelpipe::flood_counters& flood = counts.flood;
+    if (flood.lost_voxels == 0 ? flood.enclosed_voxels != 0 : flood.closing != 0)
+        helps += (helps.empty() ? "" : ", and ") + std::string("--solid exterior") +
+                 (flood.closing != 0 ? " --closing " + std::to_string(flood.closing) : "") +
+                 " keeps what other rows have inside";
+    return helps.empty() ? "No repair that was tried helps" : "Tried on it: " + helps;
+}
+
+} // namespace
+
 std::string open_warning(const solid_request& request, const solid_counts& counts) {
     if (counts.open_rows == 0 || request.vote || request.rule == solid_rule::exterior) return {};
     std::array<char, 32> share{};
@@ -87,19 +105,34 @@ std::string open_warning(const solid_request& request, const solid_counts& count
                              " rows of voxels along x (" + share.data() + " %" +
                              (each ? ", counted for each draw" : "") +
                              ") do not leave it as often as they enter it, so voxels behind a hole may be wrong. ";
-    if (request.close_holes != 0)
-        return "the model is not closed, after lids on " + std::to_string(counts.closed_holes) + " of its " +
-               std::to_string(counts.holes) + " holes: " + rows + "--close-holes without a number closes all holes";
-    return "the model is not closed: " + rows +
-           "--close-holes puts lids on holes, --vote takes what most of the rows along x, y and z say, --solid "
-           "exterior "
-           "what cannot be reached from outside";
+    const std::string lids = request.close_holes == 0 ? ""
+                                                      : ", after lids on " + std::to_string(counts.closed_holes) +
+                                                            " of its " + std::to_string(counts.holes) + " holes";
+    return "the model is not closed" + lids + ": " + rows + advice(request, counts);
 }
 
 std::string flood_warning(const solid_request& request, const solid_counts& counts, std::uint64_t voxels) {
-    if (request.rule != solid_rule::exterior || voxels == 0 || voxels != counts.touched) return {};
-    return "--solid exterior finds nothing enclosed: all its voxels are the surface's. If the flood leaked through "
-           "gaps, --closing R closes those of about 2 R voxels";
+    if (request.rule != solid_rule::exterior || voxels == 0) return {};
+    const bool is_empty = voxels == counts.touched;
+    const voxelpipe::flood_counters& flood = counts.flood;
+    const std::string nothing = "--solid exterior finds nothing enclosed: all its voxels are the surface's";
+    if (flood.lost_voxels == 0) return is_empty ? nothing : "";
+    std::string entry;
+    if (flood.entered_holes != 0)
+        entry = " by " + std::to_string(flood.entered_holes) + (flood.entered_holes == 1 ? " hole" : " holes") +
+                " of the model, of up to " + std::to_string(flood.hole_width) + " voxels,";
+    if (flood.face_voxels != 0)
+        entry +=
+            (entry.empty() ? " where" : " and where") +
+            std::string(" the model leaves the grid (what it takes there it would not take in a grid that holds the "
+                        "model),");
+    const std::string text = (is_empty ? nothing + ". Its flood" : std::string("the flood of --solid exterior")) +
+                             " came in" + (entry.empty() ? " where no hole was found" : entry) + " and took " +
+                             std::to_string(flood.lost_voxels) + " voxels that rows of voxels have inside. ";
+    std::string keeping = flood.close_holes != 0 ? "--solid nonzero --close-holes" : "";
+    if (flood.closing != 0)
+        keeping += (keeping.empty() ? "" : " or ") + std::string("--closing ") + std::to_string(flood.closing);
+    return text + (keeping.empty() ? "No repair that was tried keeps them" : "Tried on it: " + keeping + " keeps them");
 }
 
 void fill_inside(volume& v, const channel& solid, const channel& surface, const solid_request& request, int threads) {

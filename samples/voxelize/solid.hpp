@@ -6,6 +6,8 @@
 #include "targets.hpp"
 #include "volume.hpp"
 
+#include <voxelpipe/status.hpp>
+
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -55,6 +57,7 @@ struct solid_request {
     const voxelpipe::core::hole_cones* cones = nullptr;
     // exterior and vote of a slab along z: what the other slabs decide (voxelpipe::solid_options::slab), not owned.
     const voxelpipe::solid_slab* slab = nullptr;
+    bool is_whole = false; // the whole model is drawn in the whole grid at once, so that it can be examined
     // sRGB of the voxels inside; none: the mean of the model's covered voxels, in linear light, by alpha.
     std::optional<std::array<std::uint8_t, 3>> fill_color;
     // Of a slab: the means of the whole grid, not owned. Null: the slab is all there is.
@@ -69,13 +72,18 @@ struct solid_counts {
     std::uint64_t max_winding = 0;
     std::uint64_t hole_edges = 0, holes = 0, closed_holes = 0; // of the whole model, with close_holes
     std::uint64_t touched = 0; // voxels that a triangle touches, where the surface is drawn
+    // An open model, or one that is flooded, has been examined (examine_solid of pipeline_solid.hpp).
+    bool is_examined = false;
+    voxelpipe::flood_counters flood{}; // what the flood of --solid exterior did, or would do
+    bool lids_balance = false;         // lids on all holes have been tried, and leave no row open
 };
 
-// One line where open rows prove that what was filled is not closed: how many, and what to do; empty where there are
-// none, or the rule does without closed models.
+// One line where open rows prove that what was filled is not closed: how many, and what has been tried and helps; empty
+// where there are none, or the rule does without closed models.
 [[nodiscard]] std::string open_warning(const solid_request& request, const solid_counts& counts);
 
-// One line where a flood leaves nothing but the surface, of so many voxels in all; empty elsewhere.
+// One line where a flood leaves nothing but the surface, of so many voxels in all, or has taken voxels of the inside;
+// empty elsewhere.
 [[nodiscard]] std::string flood_warning(const solid_request& request, const solid_counts& counts, std::uint64_t voxels);
 
 // The mean of colours, in linear light, weighted by alpha, opaque; clay where none of them shows. Sums of integers, so

@@ -37,6 +37,10 @@ namespace voxelize {
         options.cones = request.cones;
     }
     options.slab = request.slab;
+    if (options.repair == vp::repair::exterior || options.repair == vp::repair::vote) {
+        options.rule = vp::solid_options{}.rule; // their inside is their own
+        return options;
+    }
     switch (request.extent) {
     case solid_extent::centre:
         options.extent = vp::solid_extent::centre;

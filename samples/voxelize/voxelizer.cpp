@@ -9,10 +9,13 @@
 
 #include <cpu_ref/backend.hpp>
 
+#include <glm/vector_relational.hpp>
+
 #include <algorithm>
 #include <chrono>
 #include <new>
 #include <optional>
+#include <span>
 #include <utility>
 
 namespace voxelize {
@@ -27,26 +30,6 @@ double volume_bytes(const voxelize_request& request) {
 }
 
 namespace {
-
-// The result, and while a ring is put around it its largest channel once more.
-void require_volume(const voxelize_request& request) {
-    double bytes = volume_bytes(request);
-    if (request.padding != 0) {
-        double largest = 0;
-        for (const target id : request.targets) {
-            voxelize_request alone = request;
-            alone.targets = {id};
-            largest = std::max(largest, volume_bytes(alone));
-        }
-        bytes += largest;
-    }
-    const glm::ivec3 extent = request.grid.extent;
-    if (request.solid) bytes += 0.25 * extent.x * extent.y * extent.z; // the bits of the surface and of the inside
-    memory::require(bytes,
-                    "a result of " + std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " +
-                        std::to_string(extent.z) + " voxels",
-                    memory::fewer_voxels_hint);
-}
 
 // Bytes for each vertex and triangle of every instance, while a slab is drawn.
 struct scene_bytes {
@@ -63,6 +46,54 @@ scene_bytes bytes_of(const scene& model, const voxelize_request& request) {
     const auto vertices = static_cast<double>(model.vertex_count());
     return {vertices * sizeof(vp::core::snapped_position), shaded ? vertices * sizeof(surface_varyings) : 0,
             static_cast<double>(model.triangle_count()) * 24, static_cast<double>(model.line_count()) * 128};
+}
+
+// Bytes of the result, of its largest channel once more while a ring is put around it, and of a solid's bits.
+struct result_bytes {
+    double volume = 0, ring = 0, bits = 0;
+};
+
+result_bytes result_of(const voxelize_request& request) {
+    result_bytes bytes{volume_bytes(request), 0, 0};
+    if (request.padding != 0)
+        for (const target id : request.targets) {
+            voxelize_request alone = request;
+            alone.targets = {id};
+            bytes.ring = std::max(bytes.ring, volume_bytes(alone));
+        }
+    const glm::ivec3 extent = request.grid.extent;
+    if (request.solid) bytes.bits = 0.25 * extent.x * extent.y * extent.z; // of the surface and of the inside
+    return bytes;
+}
+
+// Bytes of a voxel while it is drawn.
+double drawn_bytes(std::span<const target> targets) {
+    double bytes = 0;
+    for (const target id : targets) {
+        const double value = static_cast<double>(size_of(info_of(id).type)) * info_of(id).components;
+        bytes += id == target::color ? 20 : id == target::color_outer ? 8 : std::max(value, 0.125);
+    }
+    return bytes;
+}
+
+// An estimate of what writers of bricks find in a dense result: a surface as large as that of the grid.
+double written_bytes(const voxelize_request& request) {
+    if (!request.write_bytes) return 0;
+    const glm::dvec3 n(request.grid.extent);
+    constexpr double brick_area = 64, brick_voxels = 512;
+    const double voxels = 2 * (n.x * n.y + n.y * n.z + n.z * n.x), all = n.x * n.y * n.z;
+    if (request.solid) return request.write_bytes(all / brick_voxels, all, 0);
+    return request.write_bytes(std::min(voxels / brick_area, all / brick_voxels), std::min(voxels, all), 0);
+}
+
+// The result has to fit; `likely` is what the run comes to.
+void require_volume(const voxelize_request& request, double likely) {
+    const auto [volume, ring, bits] = result_of(request);
+    const glm::ivec3 extent = request.grid.extent;
+    memory::require(volume + ring + bits,
+                    "a result of " + std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " +
+                        std::to_string(extent.z) + " voxels",
+                    memory::fewer_voxels_hint, likely);
 }
 
 volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats) {
@@ -154,7 +185,9 @@ volume with_ring(volume inside, const voxelize_request& request) {
 
 } // namespace
 
-std::string why_empty(const voxelize_stats& stats, voxelpipe::coverage coverage) {
+std::string why_empty(const voxelize_stats& stats, const voxelize_request& request, const glm::dvec3& low,
+                      const glm::dvec3& high) {
+    const voxelpipe::coverage coverage = request.coverage;
     const std::string text = "no voxel is covered: ";
     if (stats.fragments_discarded != 0)
         return text + "alpha discards all " + std::to_string(stats.fragments_discarded) + " fragments";
@@ -172,7 +205,14 @@ std::string why_empty(const voxelize_stats& stats, voxelpipe::coverage coverage)
         return text + "no triangle, line or point has positions that can be drawn";
     if (stats.triangles != 0 && stats.triangles_dropped == stats.triangles)
         return text + "no triangle has three positions that can be drawn";
-    return text + "the model lies outside the grid";
+    const voxelpipe::grid& grid = request.grid;
+    const glm::dvec3 first = grid.part_origin(), last = first + glm::dvec3(grid.extent) * grid.voxel_size;
+    if (glm::any(glm::greaterThan(first, high)) || glm::any(glm::lessThan(last, low)))
+        return text + "the model lies outside the grid";
+    const bool is_within = glm::all(glm::greaterThanEqual(first, low)) && glm::all(glm::lessThanEqual(last, high));
+    return text + "no triangle, line or point meets the grid, which lies " +
+           (is_within ? "within the model's bounds" : "across the model's bounds, where nothing is") +
+           ": move or enlarge it with --origin and --extent, or take what encloses it with --solid nonzero";
 }
 
 std::string cancelled_warning(const voxelize_stats& stats) {
@@ -182,11 +222,26 @@ std::string cancelled_warning(const voxelize_stats& stats) {
            "--target normal is 0 there";
 }
 
+double dense_need(const scene& model, const voxelize_request& request) {
+    const auto [volume, ring, bits] = result_of(request);
+    const scene_bytes parts = bytes_of(model, request);
+    // A slab of one layer, and each thread's tile with its sums.
+    constexpr double least_work = 1 << 20, thread_bytes = 1 << 20, tile_voxels = 32768, sums = 2.5;
+    const double voxel = drawn_bytes(request.targets);
+    const double threads = thread_count(request.threads) * (thread_bytes + tile_voxels * (sums * voxel + 8));
+    const double layer = voxel * request.grid.extent.x * request.grid.extent.y;
+    const double drawn = parts.vertices + parts.varyings + parts.triangles + parts.lines + least_work + layer + threads;
+    return volume + std::max({ring, bits + drawn, written_bytes(request)});
+}
+
 volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
-    require_volume(request);
+    const double need = dense_need(model, request);
+    memory::expect(need);
+    require_volume(request, need);
     try {
         voxelize_request inside = request;
         inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
+        if (inside.solid) inside.solid->is_whole = true;
         if (request.backend != backend_choice::cpu)
             if (std::optional<volume> result = try_cuda(model, inside, stats))
                 return with_ring(std::move(*result), request);

@@ -60,6 +60,9 @@ struct voxelize_request {
     std::uint64_t device_memory = 0;      // most bytes to take of a GPU's memory; 0: all that is free
     std::shared_ptr<cuda_start> cuda;     // if CUDA is starting already; otherwise it starts when it is wanted
     std::function<void(double)> progress; // called with 0..1, one call at a time; may be empty
+    // Bytes that writing takes at most beside a result of so many bricks and voxels, with so many more voxels in tiles;
+    // empty where nothing is written.
+    std::function<double(double bricks, double voxels, double in_tiles)> write_bytes;
     // color-outer of a slab along z: the ends of the columns along z in the whole grid, by x and y within the slab. Not
     // owned. Null: the slab is all there is.
     const column_ends* columns = nullptr;
@@ -117,13 +120,16 @@ struct backend_error : std::runtime_error {
 // Throws memory_error, backend_error, and std::runtime_error for what the library refuses.
 [[nodiscard]] volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats);
 
-// The reason why no voxel is covered, one line; for stats that count none.
-[[nodiscard]] std::string why_empty(const voxelize_stats& stats, voxelpipe::coverage coverage);
+// The reason why no voxel is covered, one line; for stats that count none. low, high: the model's bounds.
+[[nodiscard]] std::string why_empty(const voxelize_stats& stats, const voxelize_request& request, const glm::dvec3& low,
+                                    const glm::dvec3& high);
 
 // One line on normals that cancel; empty where none do.
 [[nodiscard]] std::string cancelled_warning(const voxelize_stats& stats);
 
 // Bytes of the volume that a request gives.
 [[nodiscard]] double volume_bytes(const voxelize_request& request);
+// Bytes that a dense run of this model on the CPU comes to, beyond those that are held before it, about.
+[[nodiscard]] double dense_need(const scene& model, const voxelize_request& request);
 
 } // namespace voxelize

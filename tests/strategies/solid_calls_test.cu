@@ -6,6 +6,7 @@
 
 #include <voxelpipe/slabs/columns.hpp>
 #include <voxelpipe/slabs/stream.hpp>
+#include <voxelpipe/solid/diagnose_repair.hpp>
 
 using namespace device_test;
 
@@ -256,6 +257,44 @@ TEST(Solids, VotesOfMoreTrianglesThanABlockHasThreads) {
         const drawing_of_bits bits{{m}, {{}}, {{true}}};
         bits.expect_same(box_grid({37, 26, 25}), {.repair = vp::repair::vote});
     }
+}
+
+// What a flood took, its holes, and what keeps it: the same counts, whether it takes nothing, much or is refused.
+TEST(Solids, DiagnosesAreTheCpus) {
+    mesh_data open;
+    add_box(open, {3, 3, 3}, {21, 21, 21});
+    open.triangles.erase(open.triangles.begin(), open.triangles.begin() + 1); // half of a face
+    mesh_data closed;
+    add_box(closed, {3, 3, 3}, {21, 21, 21});
+    mesh_data leaving;
+    add_box(leaving, {3, 3, 3}, {31, 21, 21});
+    mesh_data around;
+    add_box(around, {-3, -3, -3}, {31, 31, 31});
+    const vp::grid g = box_grid({24, 24, 24});
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    bool has_lost = false, has_kept = false, is_refused = false;
+    std::vector<mesh_data> meshes = broken_meshes();
+    meshes.insert(meshes.end(), {open, closed, leaving, around});
+    for (const mesh_data& m : meshes) {
+        const vp::mesh<vp::cpu_backend> here(cpu, m.positions, m.triangles);
+        const vp::mesh<vp::cuda_backend> there(gpu, m.positions, m.triangles);
+        for (const int closing : {0, 2}) {
+            if (closing != 0 && &m == &meshes[0]) continue; // takes long to emulate
+            vp::solid_options options;
+            options.closing = closing;
+            const vp::status a = vp::diagnose_repair(cpu, here.view(), g, vp::passthrough{}, options),
+                             b = vp::diagnose_repair(gpu, there.view(), g, vp::passthrough{}, options);
+            EXPECT_EQ(a.code, b.code);
+            EXPECT_EQ(a.where, b.where);
+            expect_same_counts(a.counts, b.counts);
+            EXPECT_EQ(a.solid, b.solid) << a.solid.flood.lost_voxels << " " << b.solid.flood.lost_voxels;
+            has_lost = has_lost || a.solid.flood.closing != 0;
+            has_kept = has_kept || (a.ok() && a.solid.flood.lost_voxels == 0);
+            is_refused = is_refused || a.code == vp::status_code::crop_without_whole;
+        }
+    }
+    EXPECT_TRUE(has_lost && has_kept && is_refused);
 }
 
 // A slab takes what the rest of the grid has decided (solid_options::slab): as on the CPU, and as the whole's layers.

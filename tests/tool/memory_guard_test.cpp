@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <memory>
 #include <new>
+#include <thread>
 #include <vector>
 
 using namespace voxelize;
@@ -70,6 +71,31 @@ TEST(MemoryGuard, SmallBlocksLeaveLessRoom) {
     memory::set_limit(0, false);
     EXPECT_LE(after + 49 * mebibyte, before); // the heap may have had some room
     EXPECT_GE(after + 55 * mebibyte, before);
+}
+
+// Nor do they go past the limit where no counted block comes between them, on whatever thread.
+TEST(MemoryGuard, SmallBlocksEndAtTheLimit) {
+    if (tool_test::sanitized) return;
+    const std::uint64_t limit = std::max(memory::peak(), memory::resident() + 100 * mebibyte);
+    memory::set_limit(limit, true);
+    std::size_t taken = 0;
+    bool refused = false;
+    std::thread([&] {
+        std::vector<block> small(limit / 16384);
+        try {
+            for (block& b : small) {
+                b = touched(32768);
+                taken += 32768;
+            }
+        } catch (const std::bad_alloc&) {
+            refused = true;
+        }
+    }).join();
+    const std::uint64_t peak = memory::peak();
+    memory::set_limit(0, false);
+    EXPECT_TRUE(refused);
+    EXPECT_LT(80 * mebibyte, taken);
+    EXPECT_GE(limit + mebibyte, peak);
 }
 
 } // namespace

@@ -111,6 +111,28 @@ TEST(ToolSlabs, AKilledRunGoesOn) {
     expect_same_group(t, "whole.zarr", "m.zarr");
 }
 
+// The same command twice at once, and a third that is killed while another waits for it.
+TEST(ToolSlabs, TwoRunsAtOnceEndWell) {
+    const tower t({"-t", "occupancy,color", "--sparse", "--padding", "2"}, 256); // 10 slabs
+    ASSERT_EQ(0, t.draw("whole.zarr", {}).code);
+    for (const bool is_killed : {false, true}) {
+        SCOPED_TRACE(is_killed);
+        fs::remove_all(t.folder / "m.zarr");
+        const pid_t first = t.begin("m.zarr", {"--resume"});
+        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+        while (t.unfinished().empty() && std::chrono::steady_clock::now() < end)
+            std::this_thread::sleep_for(std::chrono::microseconds(100));
+        const pid_t second = t.begin("m.zarr", {"--resume"});
+        std::this_thread::sleep_for(std::chrono::milliseconds(is_killed ? 5 : 0));
+        if (is_killed) kill(first, SIGKILL);
+        const outcome a = wait_for(t.folder, first), b = wait_for(t.folder, second);
+        EXPECT_TRUE(a.code == 0 || (is_killed && a.code == 128 + SIGKILL)) << a.code << a.err;
+        EXPECT_EQ(0, b.code) << b.err;
+        EXPECT_TRUE(t.unfinished().empty());
+        expect_same_group(t, "whole.zarr", "m.zarr");
+    }
+}
+
 // Processes that come late, as those of slow hosts do: without a slab of their own, and while another process makes the
 // output.
 TEST(ToolSlabs, LateProcessesLeaveNothing) {
@@ -129,8 +151,11 @@ TEST(ToolSlabs, LateProcessesLeaveNothing) {
     const pid_t late = t.begin("n.zarr", {"--world-size", "2", "--rank", "0"});
     const auto waits = [&] { // "1: -> FLOCK  ADVISORY  WRITE 123 ..."
         const std::string all = read_file("/proc/locks"), process = " " + std::to_string(late) + " ";
-        const std::size_t at = all.find(process);
-        return at != std::string::npos && all.rfind("->", at) > all.rfind('\n', at);
+        for (std::size_t at = all.find(process); at != std::string::npos; at = all.find(process, at + 1)) {
+            const std::size_t line = all.rfind('\n', at) + 1;                             // 0 of the first
+            if (all.substr(line, at - line).find("->") != std::string::npos) return true; // it holds others
+        }
+        return false;
     };
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (!waits() && std::chrono::steady_clock::now() < end)

@@ -75,6 +75,31 @@ TEST(ToolSparse, HoldsTheVoxelsAndValuesOfADenseRun) {
             }
 }
 
+// A .nvdb makes the tool keep bricks, which changes no other output.
+TEST(ToolSparse, ArraysStayGridsWhateverElseIsWritten) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    for (const char* const targets : {"occupancy", "occupancy,color,normal"}) {
+        const auto draw = [&](const std::vector<std::string>& outputs) {
+            std::vector<std::string> arguments{folder / "m.glb", "-r", "24", "-t", targets, "--compression", "0"};
+            for (const std::string& output : outputs) arguments.insert(arguments.end(), {"-o", folder / output});
+            const outcome result = run(folder, arguments);
+            EXPECT_EQ(0, result.code) << result.err;
+            return result;
+        };
+        draw({"alone.npy", "alone.npz"});
+        EXPECT_NE(std::string::npos, draw({"beside.npy", "x.nvdb", "beside.npz"}).err.find("a sparse grid of"));
+        const std::vector<std::string> several{".npz", ".occupancy.npy", ".color.npy", ".normal.npy"};
+        const std::vector<std::string> one{".npz", ".npy"};
+        for (const std::string& end : std::string(targets) == "occupancy" ? one : several) {
+            const std::string alone = read_file(folder / ("alone" + end));
+            EXPECT_LT(1000U, alone.size()) << end;
+            EXPECT_TRUE(alone == read_file(folder / ("beside" + end))) << end;
+        }
+    }
+    EXPECT_EQ(3U, read_npy(folder / "beside.npy").shape.size()); // of the one target, before
+}
+
 TEST(ToolSparse, SolidsHoldTheVoxelsAndValuesOfADenseRun) {
     const scratch_folder folder;
     gltf_test::small_world().write_glb(folder / "m.glb");

@@ -38,7 +38,9 @@ enum class solid_extent : std::uint8_t {
 enum class repair : std::uint8_t {
     none,        // a hole casts its shadow along +x; solid_counters::open_rows tells
     close_holes, // a cone is put over each hole's boundary, before anything else
-    // Fill rule and extent do not apply to the other two; what a triangle touches is inside.
+    // The other two have an inside of their own, and what a triangle touches belongs to it: a rule or an extent that is
+    // not solid_options' default is refused with status_code::bad_solid_options.
+    // diagnose_repair (diagnose_repair.hpp) tells whether a flood took part of the inside.
     exterior, // what a flood from outside the grid does not reach through untouched voxels: fills cavities; no crops
     vote,     // what most of the closed rows along x, y and z call inside by even_odd; a tie is outside
 };
@@ -130,6 +132,8 @@ template <class Mesh, class VertexShader, class SolidShader, class Payload>
 // Names the calls of this module: a backend implements voxelize_solid as run_module(solid_tag, backend, draws, grid,
 // framebuffer_view or A-buffer, options, number of triangles), which argument-dependent lookup finds by the tag.
 struct solid_tag {};
+// The same for diagnose_repair: draws, grid, bodies. Gives the lids on all holes of each body.
+struct find_holes_tag {};
 
 // True if a backend's calls take solid_options::slab.
 template <class Backend>
@@ -141,6 +145,10 @@ inline constexpr bool takes_solid_slabs = requires {
     const bool known = o.rule <= fill_rule::positive && o.bodies <= bodies::draw && o.extent <= solid_extent::inner &&
                        o.repair <= repair::vote;
     if (!known || o.closing < 0 || o.closing > solid_options::max_closing)
+        return failure(status_code::bad_solid_options);
+    constexpr solid_options plain;
+    if (o.repair != repair::none && o.repair != repair::close_holes &&
+        (o.rule != plain.rule || o.extent != plain.extent))
         return failure(status_code::bad_solid_options);
     if (o.slab != nullptr) {
         if (!takes_slabs) return failure(status_code::strategy_unavailable);

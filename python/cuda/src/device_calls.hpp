@@ -44,6 +44,10 @@ struct device_values {
 [[nodiscard]] status draw_solid(const device_stream& on, const mesh_view<>& mesh,
                                 const std::vector<std::uint64_t>& first_triangles, const grid& g,
                                 const solid_options& options, std::uint8_t* out);
+// vp::diagnose_repair of the same bodies.
+[[nodiscard]] status examine_solid(const device_stream& on, const mesh_view<>& mesh,
+                                   const std::vector<std::uint64_t>& first_triangles, const grid& g,
+                                   const solid_options& options);
 
 // Writes columns [first, first + count) of `out`, (nz, ny, nx, columns); `fill` where there is no fragment.
 [[nodiscard]] status bake(const device_stream& on, const mesh_view<>& mesh, const grid& g, coverage rule,

@@ -132,6 +132,19 @@ void bind_dense(nb::module_& m) {
               }
               return report_solid(s);
           });
+    m.def("diagnose_repair", [](const stream_of& on, const device_array& positions, const device_array& triangles,
+                                const std::vector<std::uint64_t>& first_triangles, const grid_state& g,
+                                const std::string& bodies_name, int closing) {
+        const call c = make_call(on, positions, triangles, g);
+        const solid_options options =
+            solid_options_named("nonzero", "outer", "exterior", bodies_name, std::nullopt, closing);
+        status s;
+        {
+            const nb::gil_scoped_release released;
+            s = examine_solid(c.on, c.mesh, first_triangles, c.where, options);
+        }
+        return report_flood(s);
+    });
     m.def("bake_float", [](const stream_of& on, const device_array& positions, const device_array& triangles,
                            const grid_state& g, const std::string& rule, const columns_of& values, bool per_triangle,
                            const std::string& blend, float fill, std::uintptr_t out) {

@@ -32,6 +32,14 @@ public:
     Assimp::IOStream* Open(const char* file, const char* mode) override;
     void Close(Assimp::IOStream* stream) override { delete stream; }
 
+    // The files that were read beside the model.
+    [[nodiscard]] std::vector<std::string> others() const {
+        std::vector<std::string> names;
+        for (const auto& [path, bytes] : others_)
+            if (bytes) names.push_back(path.string());
+        return names;
+    }
+
     // Material libraries that the model names and that cannot be read, in its order, each once.
     [[nodiscard]] const std::vector<std::string>& missing_libraries() const { return missing_; }
     // The library that assimp took in place of a missing one: that beside the model, with its name.

@@ -246,6 +246,7 @@ model read_model(std::span<const std::byte> bytes, const std::string& name, cons
     for (unsigned i = 0; i < scene->mNumMaterials; ++i) add_material(result, *scene->mMaterials[i], *scene);
     for (unsigned i = 0; i < scene->mNumTextures; ++i) add_embedded(result, *scene->mTextures[i]);
     warn_of_libraries(result, *scene, *files);
+    result.files = files->others();
     left_out without;
     std::vector<std::vector<std::uint32_t>> primitives_of(scene->mNumMeshes); // by mesh
     for (unsigned i = 0; i < scene->mNumMeshes; ++i)

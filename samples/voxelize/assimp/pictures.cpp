@@ -106,6 +106,19 @@ bool asks_for_texture(const material& shown, const texture_source& source, const
     return source.is_there() && (options.colors || (options.blend_cuts && shown.alpha == alpha_mode::blend));
 }
 
+void name_files(const model& source, const gltf_options& options) {
+    if (!options.names_file) return;
+    const auto name = [&](const std::string& file, bool is_beside) {
+        const std::optional<std::filesystem::path> path = local_file(file);
+        if (!path) return;
+        options.names_file(*path);
+        if (is_beside) options.names_file(path->filename());
+    };
+    for (const std::string& file : source.files) name(file, false);
+    for (const texture_source& texture : source.textures)
+        if (!texture.path.empty()) name(texture.path, true);
+}
+
 void load_pictures(const model& source, const std::vector<bool>& asked_for, const gltf_file_reader& read_file,
                    gltf::budget& memory, scene& result, const load_hooks& hooks) {
     picture_loader pictures{source, read_file, memory, result, hooks};

@@ -42,6 +42,8 @@ std::vector<std::byte> to_bytes(const model& source) {
     }
     out.value(static_cast<std::uint64_t>(source.warnings.size()));
     for (const std::string& warning : source.warnings) out.list(warning);
+    out.value(static_cast<std::uint64_t>(source.files.size()));
+    for (const std::string& file : source.files) out.list(file);
     return out.take();
 }
 
@@ -115,6 +117,8 @@ model from_bytes(std::span<const std::byte> bytes) {
     }
     result.warnings.resize(in.count(8));
     for (std::string& warning : result.warnings) warning = gltf::printable(text(), 300);
+    result.files.resize(in.count(8));
+    for (std::string& file : result.files) file = text();
     if (!in.at_end()) wire_reader::fail();
     check(result);
     return result;

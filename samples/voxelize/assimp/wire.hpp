@@ -42,6 +42,7 @@ struct model {
     std::vector<texture_source> textures; // one a material
     std::vector<embedded_picture> embedded;
     std::vector<std::string> warnings;
+    std::vector<std::string> files; // that were read beside the model's own, relative to its folder
 };
 
 class wire_writer {

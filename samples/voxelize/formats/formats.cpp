@@ -32,6 +32,8 @@ struct writer {
                                                       const write_options&) = nullptr;
     std::vector<std::filesystem::path> (*of_shape)(const voxel_shape&, const std::filesystem::path&,
                                                    const write_options&) = nullptr;
+    // The names of its files; null: the path alone.
+    written_names (*names)(const volume&, const std::filesystem::path&, const write_options&, held_as) = nullptr;
 };
 
 constexpr auto all_formats = std::to_array<format>({
@@ -59,18 +61,18 @@ constexpr auto all_formats = std::to_array<format>({
 #endif
 });
 constexpr auto all_writers = std::to_array<writer>({
-    {write_npy},
+    {write_npy, nullptr, npy_names},
     {write_npz},
     {nullptr, write_vox},
     {nullptr, write_schem},
     {nullptr, write_binvox},
     {write_vti},
-    {write_pvti},
-    {write_nrrd},
-    {write_zarr},
-    {nullptr, write_glb},
-    {nullptr, write_obj},
-    {nullptr, write_ply},
+    {write_pvti, nullptr, pvti_names},
+    {write_nrrd, nullptr, channel_names},
+    {write_zarr, nullptr, zarr_names},
+    {nullptr, write_glb, mesh_names},
+    {nullptr, write_obj, mesh_names},
+    {nullptr, write_ply, mesh_names},
     {nullptr, write_xyz},
     {write_png},
     {write_page},
@@ -125,6 +127,17 @@ std::vector<std::filesystem::path> write(const volume& v, const std::filesystem:
     const writer& w = all_writers[number_of(f)];
     if (w.of_shape != nullptr) return w.of_shape(voxel_shape(v, options.threads), path, options);
     return w.of_channels(v, path, options);
+}
+
+written_names names_of(const volume& shape, const std::filesystem::path& path, const write_options& options,
+                       held_as held) {
+    const writer& w = all_writers[number_of(known_format(path))];
+    return w.names != nullptr ? w.names(shape, path, options, held) : written_names{{path}, {}};
+}
+
+void check_replaceable(const std::filesystem::path& path) {
+    if (const std::filesystem::path target = zarr_target(path); lower_extension(target) == ".zarr")
+        check_zarr_target(target);
 }
 
 std::vector<std::filesystem::path> write(const voxel_shape& v, const std::filesystem::path& path,

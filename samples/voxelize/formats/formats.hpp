@@ -31,6 +31,7 @@ struct write_options {
     int threads = 0;                             // 0 takes all cores. No output depends on it
     bool merge_faces = false;             // .ply, .obj, .glb: coplanar faces of equal colour become one rectangle
     bool points = false;                  // .ply holds the voxels' centres, not their outer sides
+    bool lists = true;                    // .npy, .npz of a sparse volume list its voxels; false: they hold the grid
     std::uint64_t faces_per_file = 0;     // .ply, .obj, .glb: most faces in a file; 0: what the format can number
     preview_options preview;              // camera and light of .png
     std::function<void(double)> progress; // called with 0..1 now and then, from the calling thread; may be empty
@@ -70,6 +71,33 @@ struct format {
 // volume itself is inconsistent. In all these cases no file of this call is left behind.
 std::vector<std::filesystem::path> write(const volume& v, const std::filesystem::path& path,
                                          const write_options& options = {});
+
+// Names that differ in a number alone: FOLDER/PREFIX1SUFFIX to FOLDER/PREFIXnSUFFIX, where n is `count`.
+struct numbered_names {
+    std::filesystem::path folder;
+    std::string prefix, suffix;
+    std::uint64_t count = UINT64_MAX;
+
+    [[nodiscard]] std::filesystem::path name(std::uint64_t n) const {
+        return folder / (prefix + std::to_string(n) + suffix);
+    }
+};
+
+// The files that an output becomes.
+struct written_names {
+    std::vector<std::filesystem::path> files; // one for certain, or several
+    std::vector<numbered_names> numbered;     // those that may be there, too, where their number is not known before
+};
+
+// How .npy and .npz hold a volume.
+enum class held_as : std::uint8_t { grid, list, unknown };
+
+// What write() and write_sparse() may write to `path`: asked for before anything is drawn, so that no output replaces
+// another, or a file that is read. `shape` has extent and channels without values; an extent of 0 is not known yet.
+[[nodiscard]] written_names names_of(const volume& shape, const std::filesystem::path& path,
+                                     const write_options& options, held_as held);
+// Throws write_error if what is at `path` was not written by this tool and must not be replaced: a folder of .zarr.
+void check_replaceable(const std::filesystem::path& path);
 
 // The same of occupied voxels and their colours (voxel_shape.hpp), for formats that show those alone: all but .npy,
 // .npz, .vti, .pvti, .nrrd, .zarr, .png, .html, .nvdb and .vdb.

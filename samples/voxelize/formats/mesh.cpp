@@ -58,17 +58,22 @@ struct mesh_part {
     std::filesystem::path path;
     std::span<const voxel_face> faces;
 };
+std::filesystem::path part_path(const std::filesystem::path& path, std::size_t n) {
+    return with_word(path, std::to_string(n + 1));
+}
 std::vector<mesh_part> split(std::span<const voxel_face> faces, const std::filesystem::path& path, std::uint64_t most) {
     if (faces.size() <= most) return {{path, faces}};
     const std::size_t parts = (faces.size() + most - 1) / most;
     std::vector<mesh_part> result;
     for (std::size_t n = 0; n < parts; ++n) {
         const std::size_t begin = faces.size() * n / parts, end = faces.size() * (n + 1) / parts;
-        result.push_back(
-            {path.parent_path() / (path.stem().string() + "." + std::to_string(n + 1) + path.extension().string()),
-             faces.subspan(begin, end - begin)});
+        result.push_back({part_path(path, n), faces.subspan(begin, end - begin)});
     }
     return result;
+}
+
+std::uint64_t most_faces(std::uint64_t of_format, const write_options& options) {
+    return options.faces_per_file != 0 ? std::min(of_format, options.faces_per_file) : of_format;
 }
 
 // Finds the faces and hands each part of them to WRITE(output_file&, welded_mesh, progress_meter&); commits all at the
@@ -76,7 +81,7 @@ std::vector<mesh_part> split(std::span<const voxel_face> faces, const std::files
 template <class Write>
 std::vector<std::filesystem::path> write_parts(const voxel_shape& v, const std::filesystem::path& path,
                                                const write_options& options, std::uint64_t most, const Write& write) {
-    if (options.faces_per_file != 0) most = std::min(most, options.faces_per_file);
+    most = most_faces(most, options);
     auto probe = std::make_unique<output_file>(path); // a path that cannot be written costs no work
     std::function<void(double)> first_half, second_half;
     if (options.progress) {
@@ -266,6 +271,23 @@ void write_glb_part(output_file& out, const voxel_shape& v, const welded_mesh& m
 }
 
 } // namespace
+
+written_names mesh_names(const volume& shape, const std::filesystem::path& path, const write_options& options,
+                         held_as) {
+    written_names names{{path}, {}};
+    const std::string extension = lower_extension(path);
+    if (options.points && extension == ".ply") return names;
+    // A side between two voxels is a face at most once.
+    double faces = 0;
+    for (std::size_t a = 0; a < 3; ++a)
+        faces += static_cast<double>(shape.extent[a] + 1) * static_cast<double>(shape.extent[(a + 1) % 3]) *
+                 static_cast<double>(shape.extent[(a + 2) % 3]);
+    const auto most = static_cast<double>(most_faces(extension == ".glb" ? max_glb_faces : max_faces, options));
+    if (faces > most)
+        names.numbered.push_back({path.parent_path(), path.stem().string() + ".", path.extension().string(),
+                                  static_cast<std::uint64_t>(std::ceil(faces / most))});
+    return names;
+}
 
 std::vector<std::filesystem::path> write_ply(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options) {

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <memory>
+#include <set>
 
 namespace voxelize {
 namespace {
@@ -45,7 +46,26 @@ std::string npy_header(scalar type, const std::string& shape) {
 
 std::filesystem::path channel_path(const std::filesystem::path& path, const volume& v, const channel& c) {
     if (v.channels.size() < 2) return path;
-    return path.parent_path() / (path.stem().string() + "." + c.name + path.extension().string());
+    return with_word(path, c.name);
+}
+
+written_names channel_names(const volume& shape, const std::filesystem::path& path, const write_options&, held_as) {
+    written_names names;
+    for (const channel& c : shape.channels) names.files.push_back(channel_path(path, shape, c));
+    return names;
+}
+
+written_names npy_names(const volume& shape, const std::filesystem::path& path, const write_options& options,
+                        held_as held) {
+    written_names names;
+    if (held != held_as::list) names = channel_names(shape, path, options, held);
+    if (held == held_as::grid) return names;
+    std::set<std::filesystem::path> files(names.files.begin(), names.files.end());
+    files.insert(path);
+    for (const channel& c : shape.channels)
+        if (c.type != scalar::bit) files.insert(with_word(path, c.name));
+    names.files.assign(files.begin(), files.end());
+    return names;
 }
 
 std::vector<std::filesystem::path> write_npy(const volume& v, const std::filesystem::path& path,

@@ -23,4 +23,10 @@ std::vector<std::filesystem::path> write_npy(const volume& v, const std::filesys
 // out.npy -> out.color.npy; the rule for every format that holds one channel a file.
 [[nodiscard]] std::filesystem::path channel_path(const std::filesystem::path& path, const volume& v, const channel& c);
 
+// The names of such a format; of .npy, which may list voxels (sparse_formats.hpp).
+[[nodiscard]] written_names channel_names(const volume& shape, const std::filesystem::path& path,
+                                          const write_options& options, held_as held);
+[[nodiscard]] written_names npy_names(const volume& shape, const std::filesystem::path& path,
+                                      const write_options& options, held_as held);
+
 } // namespace voxelize

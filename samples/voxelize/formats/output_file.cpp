@@ -3,10 +3,16 @@
 
 #include "output_file.hpp"
 
+#include "part.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <cerrno>
 #include <cstring>
 #include <limits>
 #include <system_error>
+#include <utility>
 
 namespace voxelize {
 namespace {
@@ -15,8 +21,8 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t buffer_bytes = std::size_t{1} << 20;
 
-// Opens a new file for writing; "x" refuses a name that exists, so that two runs never share a temporary.
-std::FILE* open_new(const fs::path& path) { return std::fopen(path.c_str(), "wbx"); }
+// The same open file again, or -1: its lock holds as long as one of both is open.
+int again(int file) { return ::fcntl(file, F_DUPFD_CLOEXEC, 0); }
 
 } // namespace
 
@@ -35,15 +41,17 @@ output_file::output_file(const fs::path& target) : target_(target), real_(target
         file_ = std::fopen(real_.c_str(), "wb");
         if (file_ == nullptr) fail("open", errno);
     } else {
-        constexpr int attempts = 1000;
-        for (int n = 0; n < attempts && file_ == nullptr; ++n) {
-            temporary_ = real_.parent_path() / (real_.filename().string() + ".part" + std::to_string(n));
-            file_ = open_new(temporary_);
-            if (file_ == nullptr && errno != EEXIST) break;
+        try {
+            locked_part part = open_part_file(real_);
+            temporary_ = part.path();
+            file_ = ::fdopen(part.file(), "wb");
+            if (file_ != nullptr) (void)part.take_file();
+        } catch (const std::system_error& failure) {
+            fail("open", failure.code().value());
         }
         if (file_ == nullptr) {
             const int reason = errno;
-            temporary_.clear();
+            fs::remove(temporary_, error);
             fail("open", reason);
         }
     }
@@ -51,11 +59,12 @@ output_file::output_file(const fs::path& target) : target_(target), real_(target
 }
 
 output_file::~output_file() {
-    if (file_ != nullptr) std::fclose(file_);
-    if (!temporary_.empty()) {
+    if (!temporary_.empty()) { // before another process can take it
         std::error_code ignored;
         fs::remove(temporary_, ignored);
     }
+    if (file_ != nullptr) std::fclose(file_);
+    if (lock_ >= 0) ::close(lock_);
 }
 
 void output_file::fail(std::string_view action, int error) const {
@@ -76,6 +85,7 @@ void output_file::seek(std::uint64_t at) {
 
 void output_file::close() {
     if (file_ == nullptr) return;
+    if (!temporary_.empty()) lock_ = again(::fileno(file_));
     std::FILE* closing = file_;
     file_ = nullptr;
     if (std::fclose(closing) != 0) fail("write", errno);
@@ -88,6 +98,7 @@ void output_file::commit() {
     fs::rename(temporary_, real_, error);
     if (error) fail("rename", error.value());
     temporary_.clear();
+    ::close(std::exchange(lock_, -1));
 }
 
 std::vector<fs::path> commit_all(std::span<const std::unique_ptr<output_file>> files) {
@@ -105,6 +116,10 @@ std::string lower_extension(const std::filesystem::path& path) {
     for (char& c : extension)
         if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
     return extension;
+}
+
+fs::path with_word(const fs::path& path, const std::string& word) {
+    return path.parent_path() / (path.stem().string() + "." + word + path.extension().string());
 }
 
 } // namespace voxelize

@@ -31,10 +31,14 @@ public:
 // The path's extension with its dot and in lower case ("A.NPZ": ".npz"), as formats are found by it.
 [[nodiscard]] std::string lower_extension(const std::filesystem::path& path);
 
+// "out.npy" and "color": "out.color.npy", the name of a file that is one of several of an output.
+[[nodiscard]] std::filesystem::path with_word(const std::filesystem::path& path, const std::string& word);
+
 class output_file {
 public:
     // Opens a temporary in the folder of `target`. A target that exists and is no regular file (a device, a pipe) is
-    // opened itself, since nothing can be renamed over it. A symbolic link is followed and kept.
+    // opened itself, since nothing can be renamed over it. A symbolic link is followed and kept. A temporary that a
+    // killed run left is taken.
     explicit output_file(const std::filesystem::path& target);
     ~output_file();
     output_file(const output_file&) = delete;
@@ -64,6 +68,7 @@ private:
     std::filesystem::path real_;      // with symbolic links followed
     std::filesystem::path temporary_; // empty when real_ itself is open
     std::FILE* file_ = nullptr;
+    int lock_ = -1; // the temporary again, whose lock (part.hpp) holds until it has its name
     std::uint64_t at_ = 0;
 };
 

@@ -156,9 +156,10 @@ std::uint64_t bytes_of(const volume& v) {
 
 // The layers [first, last) of the grid, whose channels read those of `v`.
 volume layers_of(const volume& v, std::int64_t first, std::int64_t last) {
-    volume part = v;
-    part.extent[2] = last - first;
-    part.channels.clear();
+    volume part; // of v's channels none is copied
+    part.extent = {v.extent[0], v.extent[1], last - first};
+    part.origin = v.origin;
+    part.voxel_size = v.voxel_size;
     for (const channel& c : v.channels) {
         const scalar type = c.type == scalar::f16 ? scalar::f32 : c.type;
         const std::uint64_t each =
@@ -229,6 +230,18 @@ std::int64_t num_pvti_pieces(const volume& v, const write_options& options) {
     if (pieces == 0)
         pieces = static_cast<std::int64_t>((bytes_of(v) - 1) / std::max<std::uint64_t>(options.piece_bytes, 1)) + 1;
     return std::clamp<std::int64_t>(pieces, 1, std::min<std::int64_t>(v.extent[2], most_pieces));
+}
+
+written_names pvti_names(const volume& shape, const std::filesystem::path& path, const write_options& options,
+                         held_as) {
+    written_names names{{path}, {}};
+    if (shape.num_voxels() == 0) {
+        names.numbered.push_back({path.parent_path(), path.stem().string() + ".", ".vti", most_pieces});
+        return names;
+    }
+    const std::int64_t pieces = std::max(num_pvti_pieces(shape, options), pieces_before(path));
+    for (std::int64_t n = 0; n < pieces; ++n) names.files.push_back(pvti_piece_path(path, n));
+    return names;
 }
 
 std::pair<std::int64_t, std::int64_t> pvti_piece_layers(const volume& v, std::int64_t piece, std::int64_t pieces) {

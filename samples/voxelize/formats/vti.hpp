@@ -23,6 +23,10 @@ std::vector<std::filesystem::path> write_vti(const volume& v, const std::filesys
 std::vector<std::filesystem::path> write_pvti(const volume& v, const std::filesystem::path& path,
                                               const write_options& options);
 
+// Its names: those of a .pvti of more pieces that is there are removed, and so are among them.
+[[nodiscard]] written_names pvti_names(const volume& shape, const std::filesystem::path& path,
+                                       const write_options& options, held_as held);
+
 // The same piece by piece, in any order and by any number of processes. Only its shape and channels are asked for of a
 // volume, but the values of its piece where that is written. Pieces count from 0 here.
 

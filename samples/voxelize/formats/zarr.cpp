@@ -4,6 +4,7 @@
 #include "zarr.hpp"
 
 #include "dense_stream.hpp"
+#include "part.hpp"
 #include "progress.hpp"
 #include "text.hpp"
 #include "zarr_array.hpp"
@@ -13,6 +14,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <system_error>
 #include <utility>
@@ -21,6 +24,9 @@ namespace voxelize {
 namespace {
 
 namespace fs = std::filesystem;
+
+// What the description of a group of this tool has, without blanks: so it knows that it may replace the group.
+constexpr std::string_view own_attributes = "\"attributes\":{\"voxelpipe\":{";
 
 // One channel on its way into its folder, chunk after chunk.
 class channel_writer {
@@ -88,39 +94,35 @@ fs::path beside(const fs::path& target, const char* what, int n) {
     return target.parent_path() / (target.filename().string() + what + std::to_string(n));
 }
 
-void require_group(const fs::path& target) {
-    std::error_code error;
-    if (fs::exists(target, error) && !fs::exists(target / "zarr.json", error))
-        throw write_error(target, "it exists and is no Zarr group");
-}
-
 // A new folder beside the target, removed unless it takes the target's place.
 class output_folder {
 public:
     explicit output_folder(const fs::path& target) : target_(target) {
-        std::error_code error;
-        require_group(target);
-        for (int n = 0; n < 1000; ++n) {
-            part_ = beside(target_, ".part", n);
-            if (fs::create_directory(part_, error)) return;
-            if (error) throw write_error(target, "make a folder: " + error.message());
+        check_zarr_target(target);
+        try {
+            part_ = make_part_folder(target);
+        } catch (const std::system_error& error) {
+            throw write_error(target, "make a folder: " + error.code().message());
         }
-        throw write_error(target, "make a folder: there are 1000 parts of it");
+        path_ = part_.path().parent_path();
     }
     output_folder(const output_folder&) = delete;
     output_folder& operator=(const output_folder&) = delete;
     ~output_folder() {
         std::error_code ignored;
-        if (!part_.empty()) fs::remove_all(part_, ignored);
+        if (!path_.empty()) fs::remove_all(path_, ignored);
     }
-    [[nodiscard]] const fs::path& path() const { return part_; }
+    [[nodiscard]] const fs::path& path() const { return path_; }
     void commit() {
-        replace_zarr(part_, target_);
-        part_.clear();
+        std::error_code ignored;
+        fs::remove(part_.path(), ignored);
+        replace_zarr(path_, target_);
+        path_.clear();
     }
 
 private:
-    fs::path target_, part_;
+    fs::path target_, path_;
+    locked_part part_;
 };
 
 std::string group_description(const volume& v) {
@@ -167,9 +169,26 @@ fs::path zarr_target(const fs::path& path) {
     return target;
 }
 
+void check_zarr_target(const fs::path& target) {
+    std::error_code error;
+    if (!fs::exists(fs::symlink_status(target, error))) return;
+    const fs::path description = target / "zarr.json";
+    if (!fs::is_regular_file(description, error)) throw write_error(target, "it exists and is no Zarr group");
+    std::ifstream file(description, std::ios::binary);
+    std::string text{std::istreambuf_iterator<char>(file), {}};
+    std::erase_if(text, [](char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; });
+    if (text.find(own_attributes) == std::string::npos)
+        throw write_error(target, "it exists, and this program did not write it: its zarr.json lacks the attribute "
+                                  "\"voxelpipe\"; remove it or name another output");
+}
+
+written_names zarr_names(const volume&, const fs::path& path, const write_options&, held_as) {
+    return {{zarr_target(path)}, {}};
+}
+
 void replace_zarr(const fs::path& folder, const fs::path& target) {
     std::error_code error;
-    require_group(target);
+    check_zarr_target(target);
     fs::path old;
     if (fs::exists(target, error)) {
         for (int n = 0; old.empty() || fs::exists(old, error); ++n) old = beside(target, ".old", n);

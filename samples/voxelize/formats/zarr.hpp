@@ -10,7 +10,8 @@
 
 namespace voxelize {
 
-// The folder appears whole or not at all; one that is there is replaced if it is a Zarr group.
+// The folder appears whole or not at all; one that is there is replaced if it is a group that this tool wrote, which
+// has the attribute "voxelpipe".
 std::vector<std::filesystem::path> write_zarr(const volume& v, const std::filesystem::path& path,
                                               const write_options& options);
 
@@ -22,13 +23,17 @@ inline constexpr std::int64_t zarr_slab_layers = 256;
 
 // The folder that a path means: without a slash at its end, and where a link leads.
 [[nodiscard]] std::filesystem::path zarr_target(const std::filesystem::path& path);
+// Throws write_error for a target that is there and is no such group.
+void check_zarr_target(const std::filesystem::path& target);
+[[nodiscard]] written_names zarr_names(const volume& shape, const std::filesystem::path& path,
+                                       const write_options& options, held_as held);
 // Writes a slab of a volume. Each file appears whole or not at all.
 void write_zarr_slab(const volume& v, const std::filesystem::path& folder, const std::filesystem::path& levels,
                      std::int64_t slab, const write_options& options);
 // Makes a group of the folder, once all slabs are there. The volume has shape and channels, without values.
 void finish_zarr_slabs(const volume& v, const std::filesystem::path& folder, const std::filesystem::path& levels,
                        const write_options& options);
-// Renames the folder; a target that is there is replaced if it is a Zarr group.
+// Renames the folder; a target that is there is replaced if it may be.
 void replace_zarr(const std::filesystem::path& folder, const std::filesystem::path& target);
 
 } // namespace voxelize

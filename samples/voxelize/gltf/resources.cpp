@@ -149,6 +149,19 @@ picture resources::decode_image(std::size_t index, std::span<const std::byte> vi
     return result;
 }
 
+void name_files(const checked_document& document, const gltf_options& options) {
+    if (!options.names_file) return;
+    const auto name = [&](const std::optional<std::string>& uri) {
+        if (!uri || uri->starts_with("data:")) return;
+        try {
+            options.names_file(local_path(*uri));
+        } catch (const gltf_error&) { // no file of this model's; its reader says so
+        }
+    };
+    for (const buffer_source& source : document.buffers) name(source.uri);
+    for (const image_source& source : document.images) name(source.uri);
+}
+
 gltf_file_reader folder_reader(std::filesystem::path folder) {
     return [folder = std::move(folder)](const std::filesystem::path& relative, std::uint64_t max_bytes) {
         return read_whole_file(folder / relative, max_bytes);

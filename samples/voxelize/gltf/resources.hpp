@@ -70,6 +70,9 @@ private:
 // else, and for every URI with a scheme.
 [[nodiscard]] std::filesystem::path local_path(const std::string& uri);
 
+// Calls options.names_file with the files of buffers and pictures, but those that local_path() refuses.
+void name_files(const checked_document& document, const gltf_options& options);
+
 // Reads files below FOLDER, which need not exist for files that name no others.
 [[nodiscard]] gltf_file_reader folder_reader(std::filesystem::path folder);
 

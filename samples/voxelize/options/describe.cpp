@@ -295,7 +295,8 @@ void describe_machine(CLI::App& app, command_line& options) {
     app.add_flag_callback(
            "--sparse", [choose_storage] { choose_storage(storage_choice::sparse); },
            "Keep only voxels that something is drawn in: .npz and .npy then hold their coords, (n, 3), and values. By "
-           "itself where an output is .nvdb or .vdb, or where a dense grid does not fit the memory")
+           "itself where an output is .nvdb or .vdb, beside which they stay grids, or where a dense grid does not fit "
+           "the memory")
         ->group("Machine");
     app.add_flag_callback(
            "--dense", [choose_storage] { choose_storage(storage_choice::dense); }, "Compute a dense grid in any case")

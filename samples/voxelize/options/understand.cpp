@@ -91,7 +91,7 @@ void understand_solid(command_line& options, const raw_options& raw) {
     solid.closing = raw.closing.value_or(0);
     const bool is_flood = solid.rule == solid_rule::exterior;
     if (raw.closing && !is_flood) throw usage_error("--closing goes with --solid exterior");
-    if (raw.vote && (is_flood || solid.rule == solid_rule::each_draw))
+    if (raw.vote && (is_flood || solid.rule == solid_rule::each_draw || solid.rule == solid_rule::positive))
         throw usage_error(std::string("--vote does not go with --solid ") + to_string(solid.rule));
     if ((is_flood || raw.vote) && solid.extent != solid_extent::outer)
         throw usage_error(std::string(is_flood ? "--solid exterior" : "--vote") + " always has --solid-extent outer");

@@ -248,8 +248,7 @@ std::vector<std::filesystem::path> write_sparse_npy(const sparse_volume& v, cons
     std::vector<std::unique_ptr<output_file>> files;
     for (const array& a : arrays) {
         const bool beside = &a != &arrays.front();
-        files.push_back(std::make_unique<output_file>(
-            beside ? path.parent_path() / (path.stem().string() + "." + a.name + path.extension().string()) : path));
+        files.push_back(std::make_unique<output_file>(beside ? with_word(path, a.name) : path));
         files.back()->write(header_of(a, v.num_voxels()));
         a.stream([&](std::span<const std::byte> piece) {
             files.back()->write(piece);
@@ -277,7 +276,8 @@ std::vector<std::filesystem::path> write_sparse_png(const sparse_volume& v, cons
 
 // Formats whose writers take the channels piece by piece, so that no dense one is ever there.
 bool is_streamed(const std::string& extension) {
-    return extension == ".vti" || extension == ".pvti" || extension == ".nrrd" || extension == ".zarr";
+    return extension == ".npy" || extension == ".npz" || extension == ".vti" || extension == ".pvti" ||
+           extension == ".nrrd" || extension == ".zarr";
 }
 
 } // namespace
@@ -306,13 +306,15 @@ std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const st
 #ifdef VOXELIZE_HAS_OPENVDB
     if (extension == ".vdb") return write_vdb(v, path, options);
 #endif
+    const bool is_listed = options.lists && (extension == ".npz" || extension == ".npy");
+    if (is_streamed(extension) && !is_listed)
+        return write(as_dense(v, v.channels), path, options);                // they hold all channels
     if (!v.tiles.empty()) return write_sparse(open_tiles(v), path, options); // the others name every voxel
-    if (extension == ".npz") return write_sparse_npz(v, path, options);
-    if (extension == ".npy") return write_sparse_npy(v, path, options);
+    if (is_listed && extension == ".npz") return write_sparse_npz(v, path, options);
+    if (is_listed) return write_sparse_npy(v, path, options);
     if (extension == ".png") return write_sparse_png(v, path, options);
     if (extension == ".html") return write_page(v, path, options);
-    if (is_streamed(extension)) return write(as_dense(v, v.channels), path, options); // they hold all channels
-    return write(voxel_shape(v), path, options);                                      // they show the occupied voxels
+    return write(voxel_shape(v), path, options); // they show the occupied voxels
 }
 
 } // namespace voxelize

@@ -9,6 +9,8 @@
 
 #include "../memory.hpp"
 #include "../pipeline.hpp"
+#include "brick_count.hpp"
+#include "brick_need.hpp"
 #include "sparse_outside.hpp"
 #include "sparse_solid.hpp"
 #include "sparse_volume.hpp"
@@ -18,7 +20,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -35,6 +37,7 @@ public:
 
     // `padding` layers of `whole`, which the request's grid is a part of, hold nothing.
     [[nodiscard]] sparse_volume run(const voxelpipe::grid& whole) {
+        require_part();
         sparse_volume result = surface_in(whole, this->num_passes());
         if (!this->request_.solid) return result;
         report_from(this->num_passes() - 1, this->num_passes(), 0, 1);
@@ -47,25 +50,27 @@ public:
     // The voxels that the surface occupies, without channels.
     [[nodiscard]] sparse_volume occupied(const voxelpipe::grid& whole) {
         if (!this->uploaded_->has_masks() && !this->draws_lines_) return walls(whole);
-        return bricks_of(whole, [this](const voxelpipe::grid& slab, std::uint64_t most, sparse_volume& part) {
-            std::bitset<base::num_targets> enabled;
-            enabled[base::occupancy] = true;
-            surface_bricks framebuffer(this->backend_, slab.extent, enabled);
-            if (!draw_surface_in(slab, framebuffer, enabled, most)) return false;
-            take_bricks(part, framebuffer);
-            return true;
-        });
+        return bricks_of(whole,
+                         [this](const voxelpipe::grid& slab, const vp::sparse_limits& most, sparse_volume& part) {
+                             std::bitset<base::num_targets> enabled;
+                             enabled[base::occupancy] = true;
+                             surface_bricks framebuffer(this->backend_, slab.extent, enabled);
+                             if (!draw_surface_in(slab, framebuffer, enabled, most)) return false;
+                             take_bricks(part, framebuffer);
+                             return true;
+                         });
     }
     // The voxels that triangles touch, whatever masks cut off.
     [[nodiscard]] sparse_volume walls(const voxelpipe::grid& whole) {
-        return bricks_of(whole, [this](const voxelpipe::grid& slab, std::uint64_t most, sparse_volume& part) {
-            std::bitset<2> enabled;
-            enabled[0] = true;
-            bits framebuffer(this->backend_, slab.extent, enabled);
-            if (!draw_part(this->uploaded_->bits_draws(), slab, framebuffer, most)) return false;
-            take_bricks(part, framebuffer);
-            return true;
-        });
+        return bricks_of(whole,
+                         [this](const voxelpipe::grid& slab, const vp::sparse_limits& most, sparse_volume& part) {
+                             std::bitset<2> enabled;
+                             enabled[0] = true;
+                             bits framebuffer(this->backend_, slab.extent, enabled);
+                             if (!draw_part(this->uploaded_->bits_draws(), slab, framebuffer, most)) return false;
+                             take_bricks(part, framebuffer);
+                             return true;
+                         });
     }
 
 private:
@@ -110,44 +115,36 @@ private:
             bytes += static_cast<double>(size_of(info_of(wanted).type)) * info_of(wanted).components;
         return bytes;
     }
-    // An estimate of the surface's voxels: its projections along the three axes, in voxels.
-    [[nodiscard]] double likely_voxels() const {
-        const glm::dvec3 size = this->uploaded_->relative_grid().voxel_size;
-        double voxels = 0;
-        for (const auto& d : this->uploaded_->bits_draws())
-            for (std::uint64_t copy = 0; copy < d.mesh.copies.count; ++copy)
-                for (const glm::uvec3& t : d.mesh.triangles) {
-                    const auto at = [&](unsigned i) {
-                        return glm::dvec3(d.vertex_shader.places[copy](d.mesh.positions[i])) / size;
-                    };
-                    const glm::dvec3 a = at(t.x), u = at(t.y) - a, v = at(t.z) - a;
-                    const double all = std::abs(u.y * v.z - u.z * v.y) + std::abs(u.z * v.x - u.x * v.z) +
-                                       std::abs(u.x * v.y - u.y * v.x);
-                    if (std::isfinite(all)) voxels += all / 2;
-                }
-        for (const auto& d : this->uploaded_->line_draws())
-            for (std::uint64_t copy = 0; copy < d.mesh.copies.count; ++copy)
-                for (std::size_t i = 0; i + 1 < d.mesh.indices.size(); i += 2) {
-                    const auto at = [&](std::size_t k) {
-                        return glm::dvec3(d.vertex_shader.place.places[copy](d.mesh.positions[d.mesh.indices[i + k]])) /
-                               size;
-                    };
-                    const glm::dvec3 along = glm::abs(at(1) - at(0));
-                    if (const double all = along.x + along.y + along.z; std::isfinite(all)) voxels += 1 + all;
-                }
-        return voxels;
+    // Throws memory_error where the request's part cannot fit, before any of it is drawn.
+    void require_part() {
+        const typename base::stage_timer timer{*this, "estimate"};
+        const voxelize_request& request = this->request_;
+        const surface_layers surface = surface_of(*this->uploaded_);
+        const value_sizes bytes =
+            value_sizes_of(request, this->only_bits_ ? (this->counts_fragments() ? 4 : 0.125)
+                                                     : static_cast<double>(this->surface_voxel_bytes()));
+        if (2 * needed_bytes(request, surface, at_most(surface), bytes) < static_cast<double>(memory::room())) return;
+        const int side = counted_side(surface);
+        this->backend_.progress = nullptr;
+        const std::optional<brick_counts> counted =
+            count_touched<bits>(this->backend_, *this->uploaded_, counted_grid(this->uploaded_->relative_grid(), side),
+                                side == 1 && !request.solid ? request.coverage : voxelpipe::coverage::conservative);
+        if (counted) require_bricks(request, needed_bytes(request, surface, counts_of(surface, *counted, side), bytes));
     }
     // As many slabs as keep within the working memory with so many bytes a voxel; one that would not is halved, down to
     // a tile's height. Their borders are borders of bricks. draw(slab, most) returns false, without having done
-    // anything, if it has more than `most` voxels. Returns the number of slabs.
+    // anything, if it has more than `most`. Returns the number of slabs.
     template <class Draw>
     int draw_within(double bytes_of_voxel, int pass, int passes, const Draw& draw) {
         const voxelpipe::grid all = this->uploaded_->relative_grid();
-        const double work = this->request_.work_memory != 0 ? static_cast<double>(this->request_.work_memory)
-                                                            : static_cast<double>(memory::room()) / 4;
-        const auto budget = static_cast<std::uint64_t>(work / bytes_of_voxel);
-        const double slabs = std::ceil(likely_voxels() / static_cast<double>(budget));
-        constexpr int tile = 32;
+        // Of what the slabs before have left.
+        const auto work = [this] {
+            return this->request_.work_memory != 0 ? static_cast<double>(this->request_.work_memory)
+                                                   : static_cast<double>(memory::room()) / 4;
+        };
+        constexpr int tile = 32, brick_area = 64;
+        const double slabs = std::ceil(surface_of(*this->uploaded_).voxels() *
+                                       (bytes_of_voxel + drawn_brick_bytes / brick_area) / work());
         const auto whole_tiles = [](double depth) { return std::max(1, static_cast<int>(depth / tile)) * tile; };
         int depth = slabs <= 1 ? all.extent.z + tile : whole_tiles(all.extent.z / slabs);
         int drawn = 0;
@@ -157,8 +154,12 @@ private:
             const voxelpipe::grid slab = all.crop({0, 0, begin}, {all.extent.x, all.extent.y, end - begin});
             report_from(pass, passes, static_cast<double>(begin) / all.extent.z,
                         static_cast<double>(end) / all.extent.z);
-            const bool is_least = end - begin <= tile;
-            if (draw(slab, is_least ? std::numeric_limits<std::uint64_t>::max() : budget)) {
+            vp::sparse_limits most;
+            if (end - begin > tile) {
+                most.bricks = static_cast<std::uint64_t>(work() / drawn_brick_bytes);
+                most.voxels = static_cast<std::uint64_t>(work() / bytes_of_voxel);
+            }
+            if (draw(slab, most)) {
                 begin = end;
                 ++drawn;
             } else {
@@ -171,7 +172,7 @@ private:
     template <class Draw>
     [[nodiscard]] sparse_volume bricks_of(const voxelpipe::grid& whole, const Draw& draw) {
         std::vector<sparse_volume> parts;
-        draw_within(bit_bytes, 0, 1, [&](const voxelpipe::grid& slab, std::uint64_t most) {
+        draw_within(bit_bytes, 0, 1, [&](const voxelpipe::grid& slab, const vp::sparse_limits& most) {
             sparse_volume part;
             part.shape = volume_of(whole);
             if (!draw(slab, most, part)) return false;
@@ -183,7 +184,7 @@ private:
     void draw_slabs(sparse_volume& result, int passes) {
         std::vector<sparse_volume> parts;
         this->stats_.slabs =
-            draw_within(voxel_bytes(), 0, passes, [&](const voxelpipe::grid& slab, std::uint64_t most) {
+            draw_within(voxel_bytes(), 0, passes, [&](const voxelpipe::grid& slab, const vp::sparse_limits& most) {
                 sparse_volume part;
                 part.shape = result.shape;
                 if (!(this->only_bits_ ? draw_bits(part, slab, most) : draw_surface(part, slab, most))) return false;
@@ -195,17 +196,15 @@ private:
         if (this->draws_lines_) this->stats_.voxels = result.num_voxels(); // a voxel may have been drawn twice
         if (this->wants(target::normal)) count_cancelled(result);
     }
-    // False if there are more than `most` voxels; nothing is drawn then.
+    // False if there is more than `most`; nothing is drawn then.
     template <class Draw, class Framebuffer>
     [[nodiscard]] bool draw_part(const std::vector<Draw>& draws, const voxelpipe::grid& slab, Framebuffer& framebuffer,
-                                 std::uint64_t most) {
-        vp::sparse_limits limits;
-        limits.voxels = most;
-        framebuffer.limit(limits);
+                                 const vp::sparse_limits& most) {
+        framebuffer.limit(most);
         return this->draw_reporting(draws, slab, framebuffer);
     }
 
-    [[nodiscard]] bool draw_bits(sparse_volume& result, const voxelpipe::grid& slab, std::uint64_t most) {
+    [[nodiscard]] bool draw_bits(sparse_volume& result, const voxelpipe::grid& slab, const vp::sparse_limits& most) {
         std::bitset<2> enabled;
         enabled[0] = !this->counts_fragments(); // one target there has to be
         enabled[1] = this->counts_fragments();
@@ -224,12 +223,12 @@ private:
 
     // False as draw_part().
     [[nodiscard]] bool draw_surface_in(const voxelpipe::grid& slab, surface_bricks& framebuffer,
-                                       std::bitset<base::num_targets> enabled, std::uint64_t most) {
+                                       std::bitset<base::num_targets> enabled, const vp::sparse_limits& most) {
         return draw_part(this->uploaded_->draws(), slab, framebuffer, most) &&
                this->draw_lines(this->uploaded_->line_draws(), slab, framebuffer, enabled);
     }
 
-    [[nodiscard]] bool draw_surface(sparse_volume& result, const voxelpipe::grid& slab, std::uint64_t most) {
+    [[nodiscard]] bool draw_surface(sparse_volume& result, const voxelpipe::grid& slab, const vp::sparse_limits& most) {
         auto enabled = this->enabled_targets();
         if (enabled.count() > 1) enabled[base::occupancy] = false;
         surface_bricks framebuffer(this->backend_, slab.extent, enabled);
@@ -295,7 +294,7 @@ private:
         channel& colors = *std::find_if(result.channels.begin(), result.channels.end(),
                                         [](const channel& c) { return c.name == info_of(target::color_outer).name; });
         draw_within(2 * sizeof(std::uint64_t) + sizeof(glm::u8vec4), 1, passes,
-                    [&](const voxelpipe::grid& slab, std::uint64_t most) {
+                    [&](const voxelpipe::grid& slab, const vp::sparse_limits& most) {
                         column_table ends{slab.offset, slab.extent, {}};
                         ends.along[0].resize(columns(slab.extent.y, slab.extent.z));
                         ends.along[1].resize(columns(slab.extent.x, slab.extent.z));

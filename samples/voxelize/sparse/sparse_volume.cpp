@@ -25,7 +25,7 @@ std::uint32_t empty_value(const channel& c) {
 
 namespace {
 
-// Reads rows of voxels from bricks.
+// Reads rows of voxels from bricks and tiles.
 class brick_reader {
 public:
     explicit brick_reader(const sparse_volume& v)
@@ -44,15 +44,18 @@ public:
         for (std::uint64_t at = first; at < first + count;) {
             const std::uint64_t x = at % nx, end = std::min({first + count - at + x, nx, (x / 8 + 1) * 8});
             const auto y = static_cast<int>(at / nx % ny), z = static_cast<int>(at / (nx * ny));
-            const std::uint64_t brick =
-                lookup.find_brick(table, voxelpipe::core::morton_key(static_cast<int>(x / 8), y / 8, z / 8));
-            if (brick != voxelpipe::brick_table::none)
+            const std::uint64_t key = voxelpipe::core::morton_key(static_cast<int>(x / 8), y / 8, z / 8);
+            if (const std::uint64_t brick = lookup.find_brick(table, key); brick != voxelpipe::brick_table::none) {
                 for (std::uint64_t i = x; i < end; ++i) {
                     const auto bit =
                         static_cast<unsigned>(voxelpipe::core::morton_key(static_cast<int>(i % 8), y % 8, z % 8));
                     if (table.masks[brick].has(bit))
                         visit(at + (i - x) - first, table.offsets[brick] + table.masks[brick].before(bit));
                 }
+            } else if (const std::uint64_t tile = voxelpipe::core::find_tile(table.tiles, table.num_tiles, key);
+                       tile != table.num_tiles) {
+                for (std::uint64_t i = x; i < end; ++i) visit(at + (i - x) - first, table.num_in_bricks() + tile);
+            }
             at += end - x;
         }
     }
@@ -123,6 +126,9 @@ sparse_volume join_slabs(std::vector<sparse_volume>&& parts, const slab_reader& 
         std::uint32_t part, brick;
     };
     std::vector<place> places;
+    std::size_t num_bricks = 0;
+    for (const sparse_volume& part : parts) num_bricks += part.keys.size();
+    places.reserve(num_bricks); // lists that grow would be held twice
     for (std::size_t p = 0; p < parts.size(); ++p)
         for (std::size_t b = 0; b < parts[p].keys.size(); ++b)
             places.push_back({parts[p].keys[b], static_cast<std::uint32_t>(p), static_cast<std::uint32_t>(b)});
@@ -151,6 +157,9 @@ sparse_volume join_slabs(std::vector<sparse_volume>&& parts, const slab_reader& 
     sparse_volume result;
     result.shape = parts.front().shape;
     for (const tile_place& at : tiles) result.tiles.push_back(at.tile);
+    result.keys.reserve(num_bricks);
+    result.masks.reserve(num_bricks);
+    result.offsets.reserve(num_bricks + 1);
     std::uint64_t rank = 0;
     for (const place& at : places) {
         result.keys.push_back(at.key);
@@ -194,6 +203,14 @@ sparse_volume open_tiles(const sparse_volume& v, const std::vector<std::uint64_t
     result.shape = v.shape;
     std::uint64_t rank = 0;
     const voxelpipe::brick_table table = v.table();
+    if (keys == nullptr) { // as many as are known; lists that grow would be held twice
+        const std::uint64_t inside = table.num_voxels() - table.num_in_bricks();
+        const std::uint64_t bricks = table.count + inside / voxelpipe::core::sparse_brick_voxels;
+        from.reserve(static_cast<std::size_t>(bricks));
+        result.keys.reserve(static_cast<std::size_t>(bricks));
+        result.masks.reserve(static_cast<std::size_t>(bricks));
+        result.offsets.reserve(static_cast<std::size_t>(bricks) + 1);
+    }
     const auto add_brick = [&](std::uint64_t key, const voxelpipe::brick_mask& mask, const source& values) {
         result.keys.push_back(key);
         result.masks.push_back(mask);

@@ -26,14 +26,13 @@ namespace voxelize {
 namespace slabs = voxelpipe::slabs;
 
 storage_decision choose_storage(storage_choice choice, const voxelize_request& request,
-                                std::span<const std::filesystem::path> outputs) {
+                                std::span<const std::filesystem::path> outputs, const dense_needs& dense) {
     if (choice == storage_choice::dense) return {};
     const auto bricks_alone = std::find_if(outputs.begin(), outputs.end(), is_sparse_format);
     const bool needs_bricks = bricks_alone != outputs.end();
-    const double dense = volume_bytes(request);
-    const bool fits = dense <= static_cast<double>(memory::room());
+    const auto room = static_cast<double>(memory::room());
     const bool insists = choice == storage_choice::sparse;
-    if (!insists && !needs_bricks && fits) return {};
+    if (!insists && !needs_bricks && dense.all <= room) return {};
     const char* refused = nullptr;
     if (request.backend == backend_choice::cuda)
         refused = "the tool draws sparse grids on the CPU, not with --backend cuda";
@@ -41,9 +40,10 @@ storage_decision choose_storage(storage_choice choice, const voxelize_request& r
         if (insists) throw backend_error(std::string("a sparse grid: ") + refused);
         return {};
     }
-    if (choice == storage_choice::sparse) return {true, ""};
-    return {true, needs_bricks ? std::string(find_format(*bricks_alone)->extension) + " holds occupied voxels alone"
-                               : "a dense one would take " + memory::mebibytes(dense)};
+    if (choice == storage_choice::sparse) return {true, true, ""};
+    return {true, dense.alone > room,
+            needs_bricks ? std::string(find_format(*bricks_alone)->extension) + " holds occupied voxels alone"
+                         : "a dense one would take " + memory::mebibytes(dense.all)};
 }
 
 // The pipeline reads the request and writes the counts where they lie.
@@ -158,6 +158,7 @@ sparse_volume run_sparse_voxelizer(scene&& model, const voxelize_request& reques
                                    voxelize_stats& stats) {
     voxelize_request inside = request;
     inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
+    if (inside.solid) inside.solid->is_whole = true;
     const bool bits_fit = decided_layer_bytes(request) * request.grid.extent.z <= static_cast<double>(memory::room());
     try {
         if (!bits_fit && model.triangle_count() != 0) return draw_in_slabs(std::move(model), request, folder, stats);

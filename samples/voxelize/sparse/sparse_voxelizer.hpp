@@ -22,13 +22,20 @@ enum class storage_choice : std::uint8_t { automatic, sparse, dense };
 
 struct storage_decision {
     bool sparse = false;
+    bool lists = false; // .npy and .npz list voxels, in place of the grid
     std::string reason; // half a line, if the choice was automatic and fell on bricks
 };
 
-// Bricks where an output has no dense form, or where a dense grid does not fit the run's memory. Throws backend_error
-// where --sparse cannot be had.
+// Bytes that a dense grid needs: with all targets, and without those that only some outputs ask for.
+struct dense_needs {
+    double all = 0, alone = 0;
+};
+
+// Bricks where an output has no dense form, or where the bytes that a dense grid needs do not fit the run's memory.
+// .npy and .npz list voxels where they would do so as the only output. Throws backend_error where --sparse cannot be
+// had.
 [[nodiscard]] storage_decision choose_storage(storage_choice choice, const voxelize_request& request,
-                                              std::span<const std::filesystem::path> outputs);
+                                              std::span<const std::filesystem::path> outputs, const dense_needs& dense);
 
 // Draws parts of a grid from one model, which it keeps. Members throw std::bad_alloc.
 class sparse_drawer {

@@ -139,14 +139,18 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
     const auto start = std::chrono::steady_clock::now();
 
     slabs::histogram layers(whole.extent);
+    surface_layers surface(classify.grid());
     vp::counters counts;
     model.for_each_block([&](const triangle_stream::block& block) {
         for (std::size_t i = 0; i < block.corners.size(); i += 3) {
             const slabs::classified c = classify(block.part, block.corners.data() + i);
             vp::core::count_class(counts, c.kind);
-            if (c.kind == vp::core::triangle_class::drawn) layers.add(c.reach);
+            if (c.kind != vp::core::triangle_class::drawn) continue;
+            layers.add(c.reach);
+            classify.add_to(surface, block.part, block.corners.data() + i);
         }
     });
+    if (ranges.all.size() == 1) require_streamed(request, surface);
     try {
         slab_passes passes(request, ranges.all, ranges.drawn, room, place.folder, ranges.kept);
         std::vector<bool> is_drawn(ranges.all.size()), is_wanted(ranges.all.size());

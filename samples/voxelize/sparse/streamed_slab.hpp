@@ -9,6 +9,7 @@
 #include "../surface.hpp"
 #include "../triangle_stream.hpp"
 #include "../voxelizer.hpp"
+#include "brick_need.hpp"
 
 #include <voxelpipe/slabs/bins.hpp>
 #include <voxelpipe/slabs/plan.hpp>
@@ -88,6 +89,14 @@ public:
         slabs::classified c = how_(snap_, grid_.extent, placed);
         if (c.reach.empty() && c.kind == vp::core::triangle_class::drawn) c.kind = vp::core::triangle_class::outside;
         return c;
+    }
+    // The grid that surface_layers are of.
+    [[nodiscard]] const voxelpipe::grid& grid() const { return grid_; }
+    void add_to(surface_layers& surface, std::size_t part, const glm::vec3* corners) const {
+        const auto in_voxels = [&](const glm::vec3& corner) {
+            return (glm::dvec3(places_[part](corner)) - grid_.part_origin()) / grid_.voxel_size;
+        };
+        surface.add_triangle(in_voxels(corners[0]), in_voxels(corners[1]), in_voxels(corners[2]));
     }
 
 private:

@@ -75,6 +75,52 @@ TEST_F(OutputFile, TwoWritersOfOneTargetDoNotMix) {
     EXPECT_EQ(names().size(), 1u);
 }
 
+// Temporaries of killed runs are taken; those that are written now are not.
+TEST_F(OutputFile, WhatAKilledRunLeftIsTaken) {
+    const auto path = folder_ / "a.bin";
+    output_file busy(path);
+    busy.write("busy");
+    for (const char* const left : {"a.bin.part1", "a.bin.part2", "a.bin.part4"})
+        std::ofstream(folder_ / left) << "a long rest";
+    {
+        output_file out(path);
+        out.write("new");
+        out.commit();
+    }
+    EXPECT_EQ(read_file(path), "new");
+    EXPECT_EQ(names(), (std::vector<std::string>{"a.bin", "a.bin.part0"}));
+    busy.commit();
+    EXPECT_EQ(read_file(path), "busy");
+    EXPECT_EQ(names(), std::vector<std::string>{"a.bin"});
+    // No temporary of ours: a link, and a file with another name.
+    std::ofstream(folder_ / "mine") << "mine";
+    std::filesystem::create_symlink(folder_ / "mine", folder_ / "a.bin.part0");
+    std::filesystem::create_hard_link(folder_ / "mine", folder_ / "a.bin.part1");
+    output_file out(path);
+    out.commit();
+    EXPECT_EQ(read_file(folder_ / "mine"), "mine");
+    EXPECT_EQ(names(), (std::vector<std::string>{"a.bin", "a.bin.part0", "a.bin.part1", "mine"}));
+}
+
+// A process that is killed gives its temporary back, however much it has written.
+TEST_F(OutputFile, AKilledProcessLeavesNoLock) {
+    const auto path = folder_ / "a.bin";
+    const pid_t child = fork();
+    if (child == 0) {
+        output_file out(path);
+        out.write("half");
+        kill(getpid(), SIGKILL);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    ASSERT_EQ(names(), std::vector<std::string>{"a.bin.part0"});
+    output_file out(path);
+    out.write("x");
+    out.commit();
+    EXPECT_EQ(read_file(path), "x");
+    EXPECT_EQ(names(), std::vector<std::string>{"a.bin"});
+}
+
 TEST_F(OutputFile, ASymbolicLinkStaysOne) {
     const auto real = folder_ / "real.bin", link = folder_ / "link.bin";
     std::ofstream(real) << "old";

@@ -113,6 +113,15 @@ TEST_F(Zarr, ReplacesOnlyAGroup) {
     std::ofstream(folder_ / "folder.zarr/mine.txt") << "mine";
     EXPECT_NE(message(folder_ / "file.zarr").find("no Zarr group"), std::string::npos);
     EXPECT_NE(message(folder_ / "folder.zarr").find("no Zarr group"), std::string::npos);
+    // A group of another program, and one of ours that a reader wrote anew in its own style.
+    fs::create_directory(folder_ / "other.zarr");
+    std::ofstream(folder_ / "other.zarr/zarr.json") << R"({"zarr_format": 3, "node_type": "group", "attributes": {}})";
+    EXPECT_NE(message(folder_ / "other.zarr").find("this program did not write it"), std::string::npos);
+    EXPECT_EQ(files(folder_ / "other.zarr"), std::vector<std::string>{"zarr.json"});
+    std::ofstream(folder_ / "other.zarr/zarr.json")
+        << "{\n\"attributes\": {\n    \"voxelpipe\": {\"origin\": [0, 0, 0]}}, \"zarr_format\": 3}";
+    EXPECT_EQ(message(folder_ / "other.zarr"), "no error");
+    fs::remove_all(folder_ / "other.zarr");
     EXPECT_NE(message(folder_ / "nowhere/a.zarr").find("No such file"), std::string::npos);
     EXPECT_EQ(read_file(folder_ / "folder.zarr/mine.txt"), "mine");
     EXPECT_EQ(names(), (std::vector<std::string>{"file.zarr", "folder.zarr"}));

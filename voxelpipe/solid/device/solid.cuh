@@ -11,6 +11,12 @@
 #include <voxelpipe/solid/device/solid_call.cuh>
 #include <voxelpipe/solid/device/solid_cones.cuh>
 
+#include <new>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
 namespace voxelpipe::device {
 
 // A solid call that counts its rows, then write(call, sorted entries, its memory, state).
@@ -102,6 +108,22 @@ status run_module(solid_tag, cuda_backend& backend, std::span<const draw<Mesh, V
         lists = std::move(made);
     }
     return s;
+}
+
+// Implements diagnose_repair: lids on all holes of each body. Waits. Throws std::bad_alloc, std::length_error, or
+// std::runtime_error with CUDA's text.
+template <class Mesh, class VertexShader, class SolidShader>
+[[nodiscard]] std::vector<hole_cones> run_module(find_holes_tag, cuda_backend& backend,
+                                                 std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
+                                                 const grid& g, bodies each) {
+    solid_options options;
+    options.bodies = each;
+    try {
+        return device::find_cones(backend, draws, g, options);
+    } catch (const device::cuda_failure& e) {
+        if (e.error == cudaErrorMemoryAllocation) throw std::bad_alloc();
+        throw std::runtime_error(std::string("voxelpipe: ") + cudaGetErrorString(e.error));
+    }
 }
 
 } // namespace voxelpipe::core

@@ -44,11 +44,12 @@ template <class T>
     return host;
 }
 
-// Waits. Throws std::bad_alloc, cuda_failure, or std::runtime_error with CUDA's text.
+// The cones of each body, found on the host. Waits. Throws std::bad_alloc, std::length_error, cuda_failure, or
+// std::runtime_error with CUDA's text.
 template <class Mesh, class VertexShader, class SolidShader>
-[[nodiscard]] solid_cones make_cones(const stream_memory& from,
-                                     std::span<const draw<Mesh, VertexShader, SolidShader>> draws, const grid& g,
-                                     const solid_options& options) {
+[[nodiscard]] std::vector<core::hole_cones> find_cones(const stream_memory& from,
+                                                       std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
+                                                       const grid& g, const solid_options& options) {
     struct mesh_on_host {
         std::vector<core::snapped_position> positions;
         std::vector<glm::uvec3> triangles;
@@ -67,7 +68,7 @@ template <class Mesh, class VertexShader, class SolidShader>
     }
     check(cudaStreamSynchronize(from.stream), stage::vertex_shade);
 
-    solid_cones made;
+    std::vector<core::hole_cones> found;
     const bool is_split = options.bodies == bodies::draw;
     for (std::size_t first = 0; first < draws.size();) {
         const std::size_t last = is_split ? first + 1 : draws.size();
@@ -78,9 +79,20 @@ template <class Mesh, class VertexShader, class SolidShader>
                             {meshes[d].triangles.data(), static_cast<std::uint32_t>(meshes[d].triangles.size()),
                              static_cast<std::uint32_t>(draws[d].mesh.positions.size())},
                             draws[d].mesh.num_triangles()});
-        const core::hole_cones cones = options.cones != nullptr
-                                           ? core::moved(options.cones[made.parts.size()], snap.offset)
-                                           : core::close_holes(body, options.max_hole_edges);
+        found.push_back(options.cones != nullptr ? core::moved(options.cones[found.size()], snap.offset)
+                                                 : core::close_holes(body, options.max_hole_edges));
+        first = last;
+    }
+    return found;
+}
+
+// Waits. Throws as find_cones().
+template <class Mesh, class VertexShader, class SolidShader>
+[[nodiscard]] solid_cones make_cones(const stream_memory& from,
+                                     std::span<const draw<Mesh, VertexShader, SolidShader>> draws, const grid& g,
+                                     const solid_options& options) {
+    solid_cones made;
+    for (const core::hole_cones& cones : find_cones(from, draws, g, options)) {
         made.counts.hole_edges += cones.edges;
         made.counts.holes += cones.holes;
         made.counts.cones += cones.cones;
@@ -102,7 +114,6 @@ template <class Mesh, class VertexShader, class SolidShader>
                          num_vertices};
         made.parts.push_back(part);
         made.num_triangles += cones.triangles.size();
-        first = last;
     }
     return made;
 }

@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+"""Models given by path, and the files that they were read from: save() does not replace them."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+# By device and inode: the paths that were read, absolute, and what messages call the file.
+_read: dict[tuple[int, int], dict[str, str]] = {}
+
+
+def _note(path: str, what: str) -> None:
+    try:
+        found = os.stat(path)
+    except OSError:  # the reader says so
+        return
+    _read.setdefault((found.st_dev, found.st_ino), {})[os.path.abspath(path)] = what
+
+
+def load(path: str) -> Any:
+    """A mesh of trimesh."""
+    try:
+        import trimesh
+    except ImportError:
+        raise ImportError("reading a model from a path needs trimesh: pip install trimesh") from None
+
+    class Noting(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
+        """Gives the files that the model names."""
+
+        def get(self, name: str) -> bytes:
+            data: bytes = super().get(name)
+            _note(os.path.join(self.parent, name.strip()), f"a file of {path!r}")
+            return data
+
+    _note(path, f"the model {path!r}")
+    return trimesh.load_mesh(path, process=False, resolver=Noting(path))
+
+
+def refuse_input(path: str) -> None:
+    """Raises ValueError if `path`, through links and by any spelling, is a file that a model was read from."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return
+    for read, what in _read.get((found.st_dev, found.st_ino), {}).items():
+        try:
+            if os.path.samefile(read, path):  # not another file that got the number of one that is gone
+                raise ValueError(f"{path} is {what}; give another name")
+        except OSError:
+            continue
