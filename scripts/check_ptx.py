@@ -1,12 +1,16 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""Checks PTX for kernel parameters that are read from a wrong address. Prints each such read; the exit status is 1 if there is any.
+"""Checks PTX for kernel parameters that are read from a wrong address, and for calls in kernels that are slow with them. Prints
+each; the exit status is 1 if there is any.
 
 nvcc 13.0 with --Ofast-compile=mid does not convert every address of a parameter: where operator[] of a glm vector in a
 `__grid_constant__` structure returns a reference to a component that is chosen at run time, PTX has a plain load from an
 address in the state space .param, without cvta.param, and the kernel reads address 0xa0, say. Device code names the components
 instead. Only PTX can be checked: a source does not show which member of which object an index selects.
+
+ptxas writes YIELD into the loops of a kernel that calls a function, which 128-bit divisions may be (exact::floor_div). The time of
+votes is that of a few threads with long loops: 1.5 x as long with YIELD.
 
     scripts/check_ptx.py FILE...    PTX of any level of optimisation
 """
@@ -18,6 +22,9 @@ FUNCTION = re.compile(r"^(?:\.(?:visible|weak|extern)\s+)*\.(entry|func)\b[^;{]*
 STATEMENT = re.compile(r"(?:@!?%p\d+\s+)?([a-z][\w.:]*)\s+([^;]*);")
 REGISTER = re.compile(r"%[A-Za-z]+\d+")
 ADDRESS = re.compile(r"\[\s*(%[A-Za-z]+\d+)\s*(?:\+\s*-?\d+\s*)?\]")
+CALLED = re.compile(r"\bcall(?:\.uni)?\b[^;]*?\b(_Z\w+)")
+# Parts of the names of functions, and of those that they must not call.
+WITHOUT_CALLS = {"toggle_along_kernel": ("floor_div_wide", "narrow_row")}
 MEMORY = ("ld", "ldu", "st", "atom", "red", "prefetch", "prefetchu")
 
 
@@ -69,6 +76,14 @@ def complaints(text):
                 yield f"{operation} {operands}, in {name}"
 
 
+def slow_calls(text):
+    """(name, callee) for each call that makes a kernel slow."""
+    for name, body in bodies(text):
+        for kernel, callees in WITHOUT_CALLS.items():
+            if kernel in name:
+                yield from ((name, callee) for callee in CALLED.findall(body) if any(part in callee for part in callees))
+
+
 def main(files):
     status = functions = 0
     for file in files:
@@ -80,6 +95,9 @@ def main(files):
             status = 1
         for complaint in complaints(text):
             print(f"{file}: an address of a parameter without cvta.param: {complaint}")
+            status = 1
+        for name, callee in slow_calls(text):
+            print(f"{file}: a call that makes a kernel slow: {callee}, in {name}")
             status = 1
     print(f"{functions} functions of {len(files)} files were read")
     return status

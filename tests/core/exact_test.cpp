@@ -162,6 +162,7 @@ TEST(RoundToInt64, TakesTiesToEven) {
 template <class Int>
 void check_divisions(Int a, Int b) {
     const int128 floor = ex::floor_div(a, b), ceil = ex::ceil_div(a, b); // the products below may exceed 64 bits
+    EXPECT_EQ(ex::floor_div_inline(a, b), floor);
     ASSERT_TRUE(floor * b <= a && a - floor * b < b);
     ASSERT_TRUE(ceil * b >= a && ceil * b - a < b);
 }

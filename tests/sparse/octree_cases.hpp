@@ -94,7 +94,9 @@ template <class Backend, class Framebuffer, class Host>
 
     const std::vector<ray> rays = rays_at(host.where.offset, host.where.extent);
     const typename Backend::template buffer<ray> cast(backend, vp::array_view<const ray>(rays));
-    typename Backend::template buffer<vp::voxel_hit> hits(backend, rays.size());
+    // Written before, so that no padding between members is copied back that nobody has written.
+    const std::vector<vp::voxel_hit> none(rays.size());
+    typename Backend::template buffer<vp::voxel_hit> hits(backend, vp::array_view<const vp::voxel_hit>(none));
     backend.for_each(rays.size(), trace{tree.view(), cast.data(), hits.data()});
     const std::vector<vp::voxel_hit> met = hits.to_host(backend);
     std::size_t some = 0;

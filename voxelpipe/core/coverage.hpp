@@ -36,8 +36,9 @@ struct stepped_floor {
 };
 
 // Narrows [lo, hi] to the x with a*x + b*y + c >= 0 for all three half-planes. The result is an interval, so a short
-// row is narrowed from its ends; a long one is solved by division. Overloads as edge has them.
-template <class Int>
+// row is narrowed from its ends; a long one is solved by division. Overloads as edge has them. IsInline: no division is
+// a function of its own (exact::floor_div_inline).
+template <bool IsInline = false, class Int>
 VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row_of(const half_plane<Int> (&h)[3], Int y, std::int64_t& lo,
                                                            std::int64_t& hi) {
     const Int r[3] = {h[0].b * y + h[0].c, h[1].b * y + h[1].c, h[2].b * y + h[2].c};
@@ -46,10 +47,10 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void narrow_row_of(const half_plane<Int>
         for (int i = 0; i < 3; ++i) {
             const Int a = h[i].a;
             if (a > 0) {
-                const Int bound = exact::ceil_div<Int>(-r[i], a);
+                const Int bound = IsInline ? -exact::floor_div_inline<Int>(r[i], a) : exact::ceil_div<Int>(-r[i], a);
                 if (bound > first) first = bound;
             } else if (a < 0) {
-                const Int bound = exact::floor_div<Int>(r[i], -a);
+                const Int bound = IsInline ? exact::floor_div_inline<Int>(r[i], -a) : exact::floor_div<Int>(r[i], -a);
                 if (bound < last) last = bound;
             } else if (r[i] < 0) {
                 last = first - 1;

@@ -299,10 +299,17 @@ template <class Int>
     return -((-a) >> bits);
 }
 
+// floor(a / b), b > 0, where it stands in any width. For kernels whose time is that of a few threads with long loops:
+// ptxas writes YIELD into the loops of a kernel that calls a function.
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE constexpr Int floor_div_inline(Int a, Int b) {
+    const Int q = a / b;
+    return q - static_cast<Int>(q * b > a);
+}
+
 // floor(a / b), b > 0; out of line in device code, where a division in 128 bits takes 300 instructions.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_DEVICE_NOINLINE constexpr int128 floor_div_wide(int128 a, int128 b) {
-    const int128 q = a / b;
-    return q - static_cast<int128>(q * b > a);
+    return floor_div_inline(a, b);
 }
 
 // floor(a / b), b > 0

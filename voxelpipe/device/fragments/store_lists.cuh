@@ -17,19 +17,9 @@ struct list_counts {
     std::uint64_t voxels, fragments;
 };
 
-// Copies a payload. Members of a pack by themselves: between them is memory that nobody has written, which a copy of
-// the whole would read. A caller's own type is copied as a whole.
-template <class Payload>
-__device__ VOXELPIPE_INLINE void copy_payload(Payload& to, const Payload& from) {
-    to = from;
-}
-template <class First, class... Rest>
-__device__ VOXELPIPE_INLINE void copy_payload(core::pack<First, Rest...>& to, const core::pack<First, Rest...>& from) {
-    to.first = from.first;
-    if constexpr (sizeof...(Rest) != 0) copy_payload(to.rest, from.rest);
-}
-
-// Copies the lists, or what of them is not in place. All threads of the launch call it.
+// Copies the lists, or what of them is not in place. All threads of the launch call it. The padding of a
+// payload, which nobody has written and nobody reads, is copied with it: tools that look for uninitialised memory
+// report that.
 template <class Key, class Payload>
 __device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint64_t num_voxels,
                            std::uint64_t num_fragments, std::uint64_t* voxels, std::uint64_t* offsets,
@@ -46,7 +36,7 @@ __device__ void copy_lists(const fragment_lists<Key, Payload>& lists, std::uint6
     if (lists.are_payloads_at_output) return; // and so is all else
     for (std::uint64_t i = thread; i < num_fragments; i += threads) {
         if (!lists.are_at_output) primitives[i] = lists.primitive(i);
-        if constexpr (!std::is_same_v<Payload, no_payload>) copy_payload(payloads[i], lists.payload_of(i));
+        if constexpr (!std::is_same_v<Payload, no_payload>) payloads[i] = lists.payload_of(i);
     }
 }
 

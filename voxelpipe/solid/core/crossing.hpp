@@ -156,7 +156,7 @@ setup_crossings(const snapped_position& a, const snapped_position& b, const snap
         static_cast<Int>(exact::floor_shift<int128>(half - dot128(t.plane, p[0]) - (positive_tie ? 0 : 1), fraction));
     t.step = t.step_rest = 0;
     if (has_steps) {
-        t.step = exact::floor_div(t.plane[0], t.plane[2]);
+        t.step = exact::floor_div_inline(t.plane[0], t.plane[2]);
         t.step_rest = t.plane[0] - t.step * t.plane[2];
     }
     return t;
@@ -170,11 +170,11 @@ VOXELPIPE_HD VOXELPIPE_INLINE constexpr void for_each_crossing_in_row(const cros
                                                                       const index_span& within, Emit&& emit) {
     std::int64_t lo = within.lo - t.origin[0], hi = within.hi - t.origin[0];
     const Int row = v - t.origin[1];
-    narrow_row(t.edge, row, lo, hi);
+    narrow_row_of<true>(t.edge, row, lo, hi);
     if (lo > hi) return;
     // The least w with plane . (u, v, w) + offset >= 0 is -floor((plane . (u, v, 0) + offset) / plane[2]).
     const Int at = t.plane[0] * lo + t.plane[1] * row + t.plane_offset;
-    Int depth = exact::floor_div(at, t.plane[2]);
+    Int depth = exact::floor_div_inline(at, t.plane[2]);
     if (lo == hi) {
         emit(t.origin[0] + lo, t.origin[2] - static_cast<std::int64_t>(depth));
         return;

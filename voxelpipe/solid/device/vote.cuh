@@ -74,6 +74,7 @@ __global__ __launch_bounds__(threads_per_block,
     using core::triangle_class;
     __shared__ voting_triangles all;
     const core::voxel_box whole = grid.whole_box();
+    constexpr unsigned neighbours = 8; // triangles of a block that follow each other in the mesh
     const unsigned share = blockIdx.x % shares;
     row_totals totals;
     // The number of the thread's triangle's lines; 0 where it has none to take.
@@ -98,10 +99,10 @@ __global__ __launch_bounds__(threads_per_block,
                                      static_cast<std::int32_t>(rows.v.lo)};
         return static_cast<std::uint32_t>(rows.v.hi - rows.v.lo + 1);
     };
-    const std::uint64_t step = std::uint64_t{gridDim.x / shares} * threads_per_block;
-    for (std::uint64_t first = std::uint64_t{blockIdx.x / shares} * threads_per_block; first < num_triangles;
-         first += step) {
-        const std::uint64_t i = first + threadIdx.x;
+    const std::uint64_t batches = (std::uint64_t{num_triangles} + threads_per_block - 1) / threads_per_block;
+    for (std::uint64_t batch = blockIdx.x / shares; batch < batches; batch += gridDim.x / shares) {
+        // Neighbours in the mesh are alike: large ones lie in many blocks.
+        const std::uint64_t i = (threadIdx.x / neighbours * batches + batch) * neighbours + threadIdx.x % neighbours;
         const std::uint32_t mine = i < num_triangles ? lines_of(static_cast<std::uint32_t>(i)) : 0;
         all.first_line[threadIdx.x] = all.scan.sum_before(mine);
         const std::uint32_t lines = all.scan.sum();

@@ -146,8 +146,10 @@ struct make_tiles {
     const std::uint64_t* keys;
     int log2_bricks;
     std::uint64_t* to;
+    std::uint32_t* unused; // moves with `to` in the sort
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         to[i] = brick_tile::of(keys[i] << (3 * log2_bricks), log2_bricks).bits;
+        unused[i] = 0;
     }
 };
 
@@ -229,7 +231,7 @@ void make_solid_bricks(Backend& backend, found_rows<Backend>&& found, const glm:
     std::size_t at = 0;
     for (std::size_t l = 0; l < levels.size(); ++l) {
         const int level = static_cast<int>(l);
-        backend.for_each(levels[l].size(), make_tiles{levels[l].data(), level, tiles.data() + at});
+        backend.for_each(levels[l].size(), make_tiles{levels[l].data(), level, tiles.data() + at, unused.data() + at});
         at += levels[l].size();
         made.tile_voxels += levels[l].size() * brick_tile::of(0, level).num_voxels();
     }
