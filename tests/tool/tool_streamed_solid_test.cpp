@@ -202,7 +202,9 @@ TEST(StreamedSolids, GridsThatDoNotFit) {
         ASSERT_EQ(0, tight.code) << tight.err;
         ASSERT_EQ(0, free.code) << free.err;
         EXPECT_TRUE(read_file(folder / "free.nvdb") == read_file(folder / "tight.nvdb"));
-        const json a = json::parse(tight.out), b = json::parse(free.out);
+        const json a = json::parse(tight.out);
+        json b = json::parse(free.out);
+        b["solid"].erase("flood"); // the whole is examined
         EXPECT_LT(1, a.value("slabs", 0));
         EXPECT_EQ(1, b.value("slabs", 0));
         EXPECT_LT(90'000'000, a.value("voxels", 0)); // the slit is closed, or outvoted
