@@ -1,11 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// The tool's pipeline for cuda_backend.
+// The tool's pipeline on GPUs: their memory, and the layers of each. cuda_pipeline.cuh names the files of its parts.
 #include "cuda_device.hpp"
 
-#include "pipeline.hpp"
+#include "cuda_pipeline.cuh"
 
-#include <voxelpipe/device/surface_calls.cuh>
 #include <voxelpipe/slabs/device_set.cuh>
 
 #include <algorithm>
@@ -17,45 +16,10 @@ namespace voxelize {
 
 namespace slabs = voxelpipe::slabs;
 
-namespace {
-
-// Any error as an exception; a lack of memory as the pipeline knows it.
-void check(cudaError_t error) {
-    if (error == cudaSuccess) return;
-    (void)cudaGetLastError();
-    if (error == cudaErrorMemoryAllocation) throw std::bad_alloc{};
-    throw std::runtime_error(std::string("CUDA says: ") + cudaGetErrorString(error));
-}
-
-template <class T, class Value>
-__global__ void work_out(T* out, std::size_t first, std::size_t count, const Value value) {
-    const std::size_t i = std::size_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    if (i < count) out[i] = value(first + i);
-}
-
-} // namespace
-
-// Values are worked out on the device, piece by piece, and each piece is copied to where it belongs.
-template <>
-struct memory_access<vp::cuda_backend> {
-    static constexpr bool on_host = false;
-
-    template <class T, class Value>
-    static void read(vp::cuda_backend& backend, T* out, std::size_t count, const Value& value, int) {
-        constexpr std::size_t piece = (std::size_t{32} << 20) / sizeof(T);
-        vp::cuda_backend::buffer<T> buffer{backend, std::min(count, piece)};
-        for (std::size_t first = 0; first < count; first += piece) {
-            const std::size_t size = std::min(piece, count - first);
-            constexpr unsigned threads = 256;
-            work_out<<<static_cast<unsigned>((size + threads - 1) / threads), threads, 0, backend.stream>>>(
-                buffer.data(), first, size, value);
-            check(cudaGetLastError());
-            check(
-                cudaMemcpyAsync(out + first, buffer.data(), size * sizeof(T), cudaMemcpyDeviceToHost, backend.stream));
-        }
-        check(cudaStreamSynchronize(backend.stream));
-    }
-};
+VOXELIZE_CUDA_BITS(extern)
+VOXELIZE_CUDA_SURFACE(extern)
+VOXELIZE_CUDA_OUTER(extern)
+VOXELIZE_CUDA_SOLID(extern)
 
 namespace {
 
@@ -74,7 +38,7 @@ public:
             refused_ = held_ + bytes;
             throw std::bad_alloc{};
         }
-        check(error);
+        gpu::check(error);
         held_ += bytes;
         most_ = std::max(most_, held_);
         return memory;
