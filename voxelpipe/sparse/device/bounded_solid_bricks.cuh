@@ -205,7 +205,8 @@ void bounded_solid_bricks<N>::list_tiles(const bounded_runs& all) {
         passes_.list(
             {here.keys, 0, inside->view(), inside_above.view(), reinterpret_cast<const std::uint64_t*>(here.parent), 2},
             here, tiles_, first_, begin, numbers_ + (l + 1));
-        for_each(room_, make_tiles_within{{tiles_.keys[0], l, tiles_.keys[0]}, begin, end, room_}, where, stream_);
+        for_each(room_, make_tiles_within{{tiles_.keys[0], l, tiles_.keys[0], tiles_.rows[0]}, begin, end, room_},
+                 where, stream_);
         here = above;
         inside = &inside_above;
     }
