@@ -239,7 +239,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
         voxelize_request alone = report.request;
         alone.targets.resize(alone.targets.size() - options.implied.size());
         storage = choose_storage(options.storage, report.request, options.outputs,
-                                 {dense_need(model, report.request), dense_need(model, alone)});
+                                 {dense_need(report.request), dense_need(alone)});
     }
     check_outputs(options, report.request, others.named, storage.lists ? held_as::list : held_as::grid, others.known);
     const glm::ivec3 extent = report.request.grid.extent;

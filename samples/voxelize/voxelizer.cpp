@@ -101,10 +101,7 @@ volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats)
     const scene_bytes parts = bytes_of(model, request);
     const double least = parts.vertices + volume_bytes(request);
     const double likely = least + parts.varyings + parts.triangles + parts.lines;
-    memory::require(least,
-                    "a scene of " + std::to_string(model.vertex_count()) + " vertices and " +
-                        std::to_string(model.triangle_count()) + " triangles",
-                    memory::fewer_voxels_hint, likely);
+    require_vertices(model, request, volume_bytes(request));
     const auto room = static_cast<double>(memory::room());
     const double likely_in_all = static_cast<double>(memory::limit()) - room + likely;
     if (request.work_memory == 0) {
@@ -222,16 +219,35 @@ std::string cancelled_warning(const voxelize_stats& stats) {
            "--target normal is 0 there";
 }
 
-double dense_need(const scene& model, const voxelize_request& request) {
+namespace {
+
+// Bytes beyond those of the model's vertices and triangles: `parts` are those.
+double dense_need_beside(const voxelize_request& request, double parts) {
     const auto [volume, ring, bits] = result_of(request);
-    const scene_bytes parts = bytes_of(model, request);
     // A slab of one layer, and each thread's tile with its sums.
     constexpr double least_work = 1 << 20, thread_bytes = 1 << 20, tile_voxels = 32768, sums = 2.5;
     const double voxel = drawn_bytes(request.targets);
     const double threads = thread_count(request.threads) * (thread_bytes + tile_voxels * (sums * voxel + 8));
     const double layer = voxel * request.grid.extent.x * request.grid.extent.y;
-    const double drawn = parts.vertices + parts.varyings + parts.triangles + parts.lines + least_work + layer + threads;
-    return volume + std::max({ring, bits + drawn, written_bytes(request)});
+    return volume + std::max({ring, bits + parts + least_work + layer + threads, written_bytes(request)});
+}
+
+} // namespace
+
+double dense_need(const scene& model, const voxelize_request& request) {
+    const scene_bytes parts = bytes_of(model, request);
+    return dense_need_beside(request, parts.vertices + parts.varyings + parts.triangles + parts.lines);
+}
+
+double dense_need(const voxelize_request& request) { return dense_need_beside(request, 0); }
+
+void require_vertices(const scene& model, const voxelize_request& request, double result) {
+    const scene_bytes parts = bytes_of(model, request);
+    const double least = parts.vertices + result;
+    memory::require(least,
+                    "a scene of " + std::to_string(model.vertex_count()) + " vertices and " +
+                        std::to_string(model.triangle_count()) + " triangles",
+                    memory::fewer_voxels_hint, least + parts.varyings + parts.triangles + parts.lines);
 }
 
 volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {

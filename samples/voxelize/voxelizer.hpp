@@ -131,5 +131,10 @@ struct backend_error : std::runtime_error {
 [[nodiscard]] double volume_bytes(const voxelize_request& request);
 // Bytes that a dense run of this model on the CPU comes to, beyond those that are held before it, about.
 [[nodiscard]] double dense_need(const scene& model, const voxelize_request& request);
+// The same without what the model's vertices and triangles take, which bricks do not spare.
+[[nodiscard]] double dense_need(const voxelize_request& request);
+// Throws memory_error where the vertices of all instances, which are snapped before anything is drawn, do not fit
+// beside `result` bytes.
+void require_vertices(const scene& model, const voxelize_request& request, double result);
 
 } // namespace voxelize

@@ -54,6 +54,7 @@ struct sparse_drawer::state {
         backend.times = &times;
         stats.backend = "cpu";
         stats.threads = thread_count(of_model.threads);
+        require_vertices(model, of_model, 0);
         pipeline.emplace(backend, model, request, stats);
         of_all = stats;
     }

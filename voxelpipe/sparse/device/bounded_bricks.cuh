@@ -62,7 +62,8 @@ public:
     // nodes, or is left as it is.
     template <class Mark>
     void mark_above(const Mark& mark, unsigned long long* nodes, cudaStream_t stream) const {
-        for (int l = levels() - 1; l > 0; --l) {
+        for (int l = max_levels - 1; l > 0; --l) { // a constant bound: g++ 13 does not see that of levels()
+            if (l >= levels()) continue;
             mark(index_level{nullptr, words_[l], l == 1 ? words_[2] : nullptr}, brick_index<>::log2_cell_of(l));
             number(l, room_.nodes, l == 1 ? nodes : unused_total_, keys_[l], stream);
         }
