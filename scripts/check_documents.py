@@ -10,6 +10,7 @@
    writes them.
 2. Links to files of the repository lead somewhere, and to headings that exist.
 3. Names of sources in backticks (`*.hpp`, `*.cuh`, `*.cpp`, `*.cu`, `*.py`, `*.sh`) are names of files that exist.
+4. docs/extending.md has at least five recipes of `##`, at most 160 lines, and paths in backticks from the root that exist.
 
 docs/notebook/ keeps the names of its time and is not checked for 3. Needs the standard library only.
 """
@@ -71,6 +72,17 @@ def check_names(text, files):
             yield f"no file is called {name}"
 
 
+def check_recipes(text, root=ROOT):
+    """Files and folders that a recipe names with their folder are there."""
+    if len(re.findall(r"^## ", text, flags=re.M)) < 5:
+        yield "fewer than five recipes"
+    if text.count("\n") > 160:
+        yield "more than 160 lines"
+    for name in sorted(set(re.findall(r"`([\w.-]+/[\w./-]+)`", FENCED.sub("", text)))):
+        if not (root / name).exists() and not name.endswith("/"):
+            yield f"no file {name}"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--update", action="store_true")
@@ -92,6 +104,8 @@ def main():
         errors += [f"{name}: {what}" for what in check_links(path, fresh)]
         if not name.startswith("docs/notebook/"):
             errors += [f"{name}: {what}" for what in check_names(FENCED.sub("", fresh), files)]
+        if name == "docs/extending.md":
+            errors += [f"{name}: {what}" for what in check_recipes(fresh)]
     for line in errors:
         print(f"error: {line}", file=sys.stderr)
     return 1 if errors else 0

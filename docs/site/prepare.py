@@ -24,7 +24,7 @@ PAGES = {
     "docs/design.md": "design", "docs/pipeline.md": "pipeline", "docs/performance.md": "performance", "docs/optimizations.md": "optimizations",
     "docs/performance_computed.md": "performance_computed", "docs/performance_solids.md": "performance_solids",
     "docs/performance_sparse.md": "performance_sparse", "docs/performance_light.md": "performance_light",
-    "docs/rejected.md": "rejected", "docs/contributing.md": "contributing", "docs/release.md": "release", "packaging/README.md": "packaging",
+    "docs/rejected.md": "rejected", "docs/contributing.md": "contributing", "docs/extending.md": "extending", "docs/release.md": "release", "packaging/README.md": "packaging",
     "CHANGELOG.md": "changelog", "README.md": "index",
 }
 LINK = re.compile(r"(!?)\[((?:[^\]\[]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
