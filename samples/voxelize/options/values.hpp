@@ -29,9 +29,14 @@ template <class Number>
         Number number{};
         const auto [next, error] = std::from_chars(at, end, number);
         bool good = error == std::errc{} && (next == end || *next == ',' || *next == 'x');
-        if (error == std::errc::result_out_of_range)
-            throw usage_error(option + ": \"" + text + "\" has a number that is " +
-                              (is_whole ? "too large" : "too large or too close to 0"));
+        if (error == std::errc::result_out_of_range) {
+            std::string message = option;
+            message += ": \"";
+            message += text;
+            message += "\" has a number that is ";
+            message += is_whole ? "too large" : "too large or too close to 0";
+            throw usage_error(message);
+        }
         if constexpr (!is_whole) good = good && std::isfinite(number);
         if (!good) break;
         numbers.push_back(number);

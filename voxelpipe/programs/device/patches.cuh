@@ -10,6 +10,7 @@
 #include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/device/call/immediate_strategy.cuh>
 #include <voxelpipe/programs/device/program_arrays.cuh>
+#include <voxelpipe/programs/program_call.hpp>
 
 #include <array>
 #include <cstddef>
