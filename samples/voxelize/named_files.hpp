@@ -13,7 +13,7 @@ namespace voxelize {
 // Nothing for other formats, and for files that cannot be read.
 [[nodiscard]] std::vector<std::filesystem::path> named_files(const std::filesystem::path& model);
 
-// Of a material library (.mtl) of a model in `folder`: the pictures that it names and that are there.
+// Returns the pictures that a material library (.mtl) names and that exist. The model lies in `folder`.
 [[nodiscard]] std::vector<std::filesystem::path> named_pictures(const std::filesystem::path& library,
                                                                 const std::filesystem::path& folder);
 

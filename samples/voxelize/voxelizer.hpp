@@ -60,8 +60,8 @@ struct voxelize_request {
     std::uint64_t device_memory = 0;      // most bytes to take of a GPU's memory; 0: all that is free
     std::shared_ptr<cuda_start> cuda;     // if CUDA is starting already; otherwise it starts when it is wanted
     std::function<void(double)> progress; // called with 0..1, one call at a time; may be empty
-    // Bytes that writing takes at most beside a result of so many bricks and voxels, with so many more voxels in tiles;
-    // empty where nothing is written.
+    // Returns the most bytes that writing takes beside the result, from its numbers of bricks, voxels and voxels in
+    // tiles; empty where nothing is written.
     std::function<double(double bricks, double voxels, double in_tiles)> write_bytes;
     // color-outer of a slab along z: the ends of the columns along z in the whole grid, by x and y within the slab. Not
     // owned. Null: the slab is all there is.

@@ -46,7 +46,7 @@ int print_names(const case_table<Backend>& cases) {
     return std::fflush(stdout) == 0 ? 0 : 1;
 }
 
-// Of a program whose cases are those of `cases`; on_threads(unsigned) makes the backend that runs them.
+// Runs the program: prints the hash of each case of `cases`. on_threads(unsigned) makes the backend that runs them.
 template <class Backend, class OnThreads>
 int run_program(const std::vector<std::string>& words, const case_table<Backend>& cases, const OnThreads& on_threads) {
     if (words.size() == 2 && words[0] == "--write-model") return write_models(words[1]);
