@@ -27,7 +27,7 @@ name="$(basename "$model")"
 name="${name%.*}"
 
 say "voxelizing $model: ${resolution} voxels along its longest side, with colour"
-build/demo/samples/voxelize/voxelize "$model" --resolution "$resolution" --target occupancy --target color \
+build/demo/tool/voxelize "$model" --resolution "$resolution" --target occupancy --target color \
     -o "demo/$name.npz" -o "demo/$name.vox" -o "demo/$name.vti" -o demo/preview.png --stats
 
 say "done; the files are in $root/demo"
@@ -39,5 +39,5 @@ cat <<TEXT
   $name.npz   for NumPy: numpy.load(...)["color"] has the shape (nz, ny, nx, 4)
   $name.vti   for ParaView
 
-Another model: make demo MODEL=file.glb (glTF 2.0, .gltf or .glb; also .obj, .stl, .ply, .off and more). The tool: build/demo/samples/voxelize/voxelize --help
+Another model: make demo MODEL=file.glb (glTF 2.0, .gltf or .glb; also .obj, .stl, .ply, .off and more). The tool: build/demo/tool/voxelize --help
 TEXT

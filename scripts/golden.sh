@@ -9,10 +9,10 @@
 #
 # RUNNER starts the programs of another machine, such as qemu-aarch64-static or wine64: --build names a build for that.
 #
-#   --build FOLDER   with tests/golden/golden_hashes and samples/voxelize/voxelize, or .exe; by default
+#   --build FOLDER   with tests/golden/golden_hashes and tool/voxelize, or .exe; by default
 #                    $VOXELPIPE_GOLDEN_BUILD, else build/test
 #   --program FILE   instead of FOLDER/tests/golden/golden_hashes
-#   --tool FILE      instead of FOLDER/samples/voxelize/voxelize
+#   --tool FILE      instead of FOLDER/tool/voxelize
 #   --library        without the tool's files
 #   --backend NAME   cpu, or cuda: golden_hashes_cuda and the tool on a GPU. Cases that a GPU cannot have are named;
 #                    77 where there is none
@@ -96,7 +96,7 @@ find_program() {
 suffix=
 [[ $backend == cpu ]] || suffix=_cuda
 program=$(find_program "${program:-$build/tests/golden/golden_hashes$suffix}")
-[[ $with_tool -eq 0 ]] || tool=$(find_program "${tool:-$build/samples/voxelize/voxelize}")
+[[ $with_tool -eq 0 ]] || tool=$(find_program "${tool:-$build/tool/voxelize}")
 
 # The tool's cases: name, model, output, options.
 tool_cases() {

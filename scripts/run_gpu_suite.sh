@@ -160,7 +160,7 @@ run_golden() {
         printf '%-15s %-28s not built\n' "$part" golden_hashes_cuda | tee -a "$record"
         return 0
     fi
-    [[ -x build/$folder/samples/voxelize/voxelize ]] || options=(--library)
+    [[ -x build/$folder/tool/voxelize ]] || options=(--library)
     log="build/gpu-$part-golden_hashes_cuda.log"
     timeout "${VOXELPIPE_PROGRAM_SECONDS:-900}" scripts/golden.sh --build "build/$folder" --backend cuda "${options[@]}" \
         >"$log" 2>&1 || status=$?

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "arrays.hpp"
 
-#include "preview.hpp"
+#include "write/preview.hpp"
 
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/sparse/io/nanovdb.hpp>

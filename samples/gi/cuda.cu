@@ -3,7 +3,7 @@
 
 // The frames of frame.hpp on an NVIDIA GPU.
 
-#include "../voxelize/cuda_device.hpp"
+#include "draw/cuda_device.hpp"
 #include "frame.hpp"
 
 #include <cuda_runtime.h>

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "film.hpp"
 
-#include "../voxelize/formats/output_file.hpp"
-#include "../voxelize/formats/png.hpp"
+#include "write/formats/output_file.hpp"
+#include "write/formats/png.hpp"
 
 #include <csignal>
 #include <cstdio>

@@ -7,10 +7,10 @@
 #include "renderer.hpp"
 #include "window.hpp"
 
-#include "../voxelize/exit_code.hpp"
-#include "../voxelize/formats/output_file.hpp"
-#include "../voxelize/model_error.hpp"
-#include "../voxelize/report.hpp"
+#include "model/exit_code.hpp"
+#include "model/model_error.hpp"
+#include "run/report.hpp"
+#include "write/formats/output_file.hpp"
 
 #include <algorithm>
 #include <cstdio>

@@ -6,7 +6,7 @@
 #include "closed_parts.hpp"
 #include "parts.hpp"
 
-#include "../voxelize/model_file.hpp"
+#include "read/model_file.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 // The scene of gi: triangles with materials, one light, a sky, an object that moves and a camera that turns. In plain
 // vectors on the host, in the scene's own units, y up.
 
-#include "../voxelize/scene.hpp"
+#include "model/scene.hpp"
 
 #include <glm/glm.hpp>
 

@@ -8,7 +8,7 @@
 
 #include "scene.hpp"
 
-#include "../voxelize/surface.hpp"
+#include "draw/surface.hpp"
 
 #include <voxelpipe/levels/direction_mips.hpp>
 #include <voxelpipe/voxelpipe.hpp>

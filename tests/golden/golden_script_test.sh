@@ -10,7 +10,7 @@ folder=$(mktemp -d "${TMPDIR:-/tmp}/voxelpipe-golden-test.XXXXXX")
 trap 'rm -rf "$folder"' EXIT
 cd "$folder"
 
-mkdir -p build/tests/golden build/samples/voxelize
+mkdir -p build/tests/golden build/tool
 cat >build/tests/golden/golden_hashes <<'PROGRAM'
 #!/usr/bin/env bash
 case $1 in
@@ -26,12 +26,12 @@ case $1 in
 esac
 PROGRAM
 # Writes as many bytes as it has arguments, so that options count.
-cat >build/samples/voxelize/voxelize <<'PROGRAM'
+cat >build/tool/voxelize <<'PROGRAM'
 #!/usr/bin/env bash
 printf '%*s' $# '' >"$3"
 PROGRAM
 printf '#!/usr/bin/env bash\necho "$1" >>%q/started.txt\nexec "$@"\n' "$folder" >runner
-chmod +x build/tests/golden/golden_hashes build/samples/voxelize/voxelize runner
+chmod +x build/tests/golden/golden_hashes build/tool/voxelize runner
 
 failures=0
 # expect CODE TEXT WORDS...: golden.sh WORDS ends with CODE, and its output has TEXT.
@@ -107,7 +107,7 @@ holds cmp share.txt <(awk 'NR % 10 == 1' lines.txt)
 printf 'exit 3\n' >>build/tests/golden/golden_hashes
 expect 1 'golden_hashes has failed'
 sed -i '$d' build/tests/golden/golden_hashes
-printf 'echo "no memory"\nexit 3\n' >>build/samples/voxelize/voxelize
+printf 'echo "no memory"\nexit 3\n' >>build/tool/voxelize
 with= expect 1 'file.nvdb: the tool has failed: no memory' --every 20
 
 [[ $failures -eq 0 ]]

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which outputs would replace a file that is read, or each other: by device and inode, and by the names that formats
 // say they write.
-#include "output_check.hpp"
+#include "run/output_check.hpp"
 
-#include "formats/formats.hpp"
+#include "write/formats/formats.hpp"
 
 #include <gtest/gtest.h>
 

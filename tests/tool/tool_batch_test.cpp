@@ -4,7 +4,7 @@
 // killed.
 #include "tool_test.hpp"
 
-#include "batch.hpp"
+#include "run/batch.hpp"
 
 #include <algorithm>
 #include <csignal>

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "formats/binvox.hpp"
 #include "test_volumes.hpp"
+#include "write/formats/binvox.hpp"
 
 #include <array>
 #include <sstream>

@@ -3,10 +3,10 @@
 // Compression in pieces on several threads, and the order that it keeps.
 
 #include "../sanitized.hpp"
-#include "formats/deflate.hpp"
-#include "formats/formats.hpp"
-#include "parallel.hpp"
+#include "model/parallel.hpp"
 #include "test_volumes.hpp"
+#include "write/formats/deflate.hpp"
+#include "write/formats/formats.hpp"
 
 #include <zlib.h>
 

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "formats/dense_stream.hpp"
-#include "formats/formats.hpp"
-#include "formats/npy.hpp"
 #include "test_volumes.hpp"
+#include "write/formats/dense_stream.hpp"
+#include "write/formats/formats.hpp"
+#include "write/formats/npy.hpp"
 
 #include <minizip/unzip.h>
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "preview_scene.hpp"
+#include "write/preview_scene.hpp"
 
 #include "../slow_build.hpp"
 #include "test_volumes.hpp"

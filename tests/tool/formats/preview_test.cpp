@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "preview.hpp"
+#include "write/preview.hpp"
 
-#include "formats/formats.hpp"
 #include "test_volumes.hpp"
+#include "write/formats/formats.hpp"
 
 #include <cmath>
 

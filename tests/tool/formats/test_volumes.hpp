@@ -6,8 +6,8 @@
 // The value of channel c at voxel (i,j,k), component m is a function of pattern(i,j,k,c,m) alone; read_back.py has the
 // same function, so that a reader in Python is compared with values that no file carried over.
 
-#include "formats/output_file.hpp"
-#include "volume.hpp"
+#include "model/volume.hpp"
+#include "write/formats/output_file.hpp"
 
 #include <sys/resource.h>
 #include <sys/wait.h>

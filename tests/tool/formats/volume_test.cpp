@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "sparse/sparse_formats.hpp"
 #include "test_volumes.hpp"
+#include "write/sparse_formats.hpp"
 
 #include <voxelpipe/sparse/io/nanovdb_layout.hpp>
 

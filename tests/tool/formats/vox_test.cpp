@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include "../slow_build.hpp"
-#include "formats/formats.hpp"
-#include "formats/palette.hpp"
 #include "test_volumes.hpp"
+#include "write/formats/formats.hpp"
+#include "write/formats/palette.hpp"
 
 #include <map>
 #include <set>

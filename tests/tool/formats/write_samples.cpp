@@ -3,11 +3,11 @@
 
 // Writes the files that read_back.py reads, and manifest.json, which says what they hold: write_samples FOLDER.
 
-#include "formats/formats.hpp"
-#include "formats/schem.hpp"
-#include "sparse/sparse_formats.hpp"
-#include "targets.hpp"
+#include "model/targets.hpp"
 #include "test_volumes.hpp"
+#include "write/formats/formats.hpp"
+#include "write/formats/schem.hpp"
+#include "write/sparse_formats.hpp"
 
 #include <cstdio>
 #include <iostream>

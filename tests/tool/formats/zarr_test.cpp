@@ -4,9 +4,9 @@
 // Zarr groups as folders: which files there are, and what a failed run leaves. Values are read back by other people's
 // readers (read_back.py).
 
-#include "formats/formats.hpp"
-#include "sparse/sparse_formats.hpp"
 #include "test_volumes.hpp"
+#include "write/formats/formats.hpp"
+#include "write/sparse_formats.hpp"
 
 using namespace voxelize;
 using namespace voxelize::testing;

@@ -1,0 +1,140 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Solids in the tool's pipeline: their bits, slab by slab, and the values of the voxels inside. Part of pipeline.hpp,
+// which includes it.
+
+#include "model/memory.hpp"
+#include "model/placement.hpp"
+#include "pipeline.hpp"
+
+#include <voxelpipe/solid/diagnose_repair.hpp>
+
+#include <algorithm>
+#include <bitset>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace voxelize {
+
+template <class Backend>
+void pipeline<Backend>::add_solid_counts(const vp::status& status, const voxelpipe::grid& part) {
+    check(status, request_);
+    if (!draws_surface_) {
+        stats_.triangles_dropped = status.counts.triangles_dropped();
+        add_counts(status);
+    }
+    solid_counts& counts = stats_.solid ? *stats_.solid : stats_.solid.emplace();
+    counts.rows += static_cast<std::uint64_t>(part.extent.y) * static_cast<std::uint64_t>(part.extent.z);
+    counts.open_rows += status.solid.open_rows;
+    counts.crossings += status.solid.crossings;
+    counts.max_winding = std::max(counts.max_winding, status.solid.max_winding);
+    counts.hole_edges = status.solid.hole_edges;
+    counts.holes = status.solid.holes;
+    counts.closed_holes = status.solid.cones;
+}
+
+template <class Backend>
+void pipeline<Backend>::draw_solid(volume& result, const voxelpipe::grid& slab, int begin) {
+    const bool is_flood = request_.solid->rule == solid_rule::exterior;
+    const voxelpipe::grid part = is_flood ? slab.uncropped() : slab;
+    std::bitset<2> enabled;
+    enabled[0] = true;
+    enabled[1] = counts_bodies();
+    bits_framebuffer& framebuffer = framebuffer_for(solid_framebuffer_, part.extent, enabled);
+    vp::status status;
+    {
+        const stage_timer timer{*this, "voxelize"};
+        status =
+            vp::voxelize_solid(backend_, uploaded_->bits_draws(), part, framebuffer, solid_options_of(*request_.solid));
+    }
+    add_solid_counts(status, slab);
+    report_(1.0);
+    const stage_timer timer{*this, "resolve"};
+    if (part.extent == slab.extent) {
+        copy<0>(result, inside_name(), framebuffer, begin);
+    } else {
+        const auto* const words = elements_of<0>(framebuffer);
+        std::vector<std::uint32_t> bits(bits_map::elements(part.extent));
+        memory_access<Backend>::read(backend_, bits.data(), bits.size(), as_it_is<std::uint32_t>{words},
+                                     thread_count(request_.threads));
+        copy_part(result, *result.find(inside_name()), bits, {part.extent.x, part.extent.y, part.extent.z},
+                  {slab.offset.x, slab.offset.y, slab.offset.z});
+    }
+    if (counts_bodies()) copy<1>(result, target::count, framebuffer, begin);
+}
+
+template <class Backend>
+void pipeline<Backend>::finish_solid(volume& result) {
+    const stage_timer timer{*this, "fill"};
+    const channel& solid = *result.find(inside_name());
+    warn_of_solid(static_cast<std::uint64_t>(result.popcount(solid)),
+                  draws_surface_ ? static_cast<std::uint64_t>(result.popcount(*result.find(bits_name_))) : 0);
+    if (wants(target::count) && !counts_bodies()) count_bits(result, solid, request_.threads);
+    if (draws_surface_) fill_inside(result, solid, *result.find(bits_name_), *request_.solid, request_.threads);
+}
+
+template <class Backend>
+void pipeline<Backend>::examine_solid() {
+    const solid_request& solid = *request_.solid;
+    solid_counts& counts = *stats_.solid;
+    const bool is_flood = solid.rule == solid_rule::exterior;
+    if (!solid.is_whole || solid.vote || (!is_flood && counts.open_rows == 0)) return;
+    const voxelpipe::grid whole = uploaded_->relative_grid().uncropped();
+    // Some twenty bits a voxel on the host, and one of the backend's.
+    const double words = static_cast<double>(bits_map::elements(whole.extent));
+    if (24 * sizeof(std::uint32_t) * words > static_cast<double>(memory::room())) return;
+    try {
+        examine_solid_bits(whole);
+    } catch (const std::bad_alloc&) { // the solid is there, and nothing is known of it
+    }
+}
+
+template <class Backend>
+void pipeline<Backend>::examine_solid_bits(const voxelpipe::grid& whole) {
+    const solid_request& solid = *request_.solid;
+    solid_counts& counts = *stats_.solid;
+    const bool is_flood = solid.rule == solid_rule::exterior;
+    const stage_timer timer{*this, "examine"};
+    const auto clock = std::exchange(backend_.times, nullptr); // of the solid alone
+    if constexpr (requires { backend_.progress; }) backend_.progress = {};
+    std::bitset<2> enabled;
+    enabled[0] = true;
+    bits_framebuffer& framebuffer = framebuffer_for(solid_framebuffer_, whole.extent, enabled);
+    vp::solid_options how = solid_options_of(solid);
+    if (!is_flood) {
+        how.repair = vp::repair::close_holes;
+        how.max_hole_edges = vp::solid_options{}.max_hole_edges;
+        const vp::status closed = vp::voxelize_solid(backend_, uploaded_->bits_draws(), whole, framebuffer, how);
+        counts.lids_balance = closed.ok() && closed.solid.open_rows == 0;
+        how.closing = 0;
+    }
+    const auto& draws = uploaded_->bits_draws();
+    using draw_type = typename std::remove_cvref_t<decltype(draws)>::value_type;
+    const vp::status status =
+        voxelpipe::diagnose_repair(backend_, std::span<const draw_type>(draws), whole, how, framebuffer);
+    backend_.times = clock;
+    if (status.code == vp::status_code::crop_without_whole && is_flood)
+        throw grid_error("the grid lies within the model, and what --solid exterior makes of it follows from the whole "
+                         "model (" +
+                         status.message() + "): take a grid that holds the model, or --solid nonzero");
+    counts.is_examined = status.ok() || status.code == vp::status_code::crop_without_whole;
+    if (status.ok()) counts.flood = status.solid.flood;
+}
+
+template <class Backend>
+void pipeline<Backend>::warn_of_solid(std::uint64_t voxels, std::uint64_t surface) {
+    stats_.voxels = voxels;
+    stats_.solid->touched += surface;
+    examine_solid();
+    if (std::string warning = flood_warning(*request_.solid, *stats_.solid, voxels); !warning.empty())
+        stats_.warnings.push_back(std::move(warning));
+    if (std::string warning = open_warning(*request_.solid, *stats_.solid); !warning.empty())
+        stats_.warnings.push_back(std::move(warning));
+}
+
+} // namespace voxelize

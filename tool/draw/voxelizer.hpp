@@ -1,0 +1,140 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// scene + options -> volume: all targets in one pass of the pipeline, on the backend of the user's choice. The result
+// is the same bytes for every backend, number of threads and amount of working memory.
+
+#include "model/memory.hpp"
+#include "model/scene.hpp"
+#include "model/targets.hpp"
+#include "model/volume.hpp"
+#include "solid.hpp"
+
+#include <voxelpipe/core/coverage.hpp>
+#include <voxelpipe/device/call/strategy.hpp>
+#include <voxelpipe/grid.hpp>
+#include <voxelpipe/status.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace voxelize {
+
+enum class backend_choice : std::uint8_t { automatic, cpu, cuda };
+
+// Meaning of a BLEND material's alpha: the weight of its colour, a cut at one half as by MASK, or nothing.
+enum class blend_alpha : std::uint8_t { weight, cutoff, ignore };
+
+// A material's alpha mode by that choice.
+[[nodiscard]] inline alpha_mode alpha_of(const material& m, blend_alpha choice) {
+    if (m.alpha != alpha_mode::blend || choice == blend_alpha::weight) return m.alpha;
+    return choice == blend_alpha::cutoff ? alpha_mode::mask : alpha_mode::opaque;
+}
+
+class cuda_start;   // cuda_device.hpp
+struct column_ends; // outside.hpp
+
+struct voxelize_request {
+    voxelpipe::grid grid;
+    int padding = 0; // voxels of it on every side in which nothing is drawn
+    voxelpipe::coverage coverage = voxelpipe::coverage::conservative;
+    std::optional<solid_request> solid;             // instead of the surface, whose coverage is conservative then
+    std::vector<target> targets{target::occupancy}; // channels of the volume, in this order, none twice
+    int depth_axis = 2;                             // 0 x, 1 y, 2 z
+    blend_alpha alpha = blend_alpha::weight;
+    backend_choice backend = backend_choice::automatic;
+    voxelpipe::strategy strategy = voxelpipe::strategy::automatic; // on a GPU
+    int devices = 1;                                               // GPUs that share the surface's layers; 0: all
+    int threads = 0;                                               // 0: all cores
+    // Bytes for what exists only while the pipeline runs. A grid that needs more is computed in slabs along z. 0: what
+    // suits the backend and the run's memory.
+    std::uint64_t work_memory = 0;
+    std::uint64_t device_memory = 0;      // most bytes to take of a GPU's memory; 0: all that is free
+    std::shared_ptr<cuda_start> cuda;     // if CUDA is starting already; otherwise it starts when it is wanted
+    std::function<void(double)> progress; // called with 0..1, one call at a time; may be empty
+    // Returns the most bytes that writing takes beside the result, from its numbers of bricks, voxels and voxels in
+    // tiles; empty where nothing is written.
+    std::function<double(double bricks, double voxels, double in_tiles)> write_bytes;
+    // color-outer of a slab along z: the ends of the columns along z in the whole grid, by x and y within the slab. Not
+    // owned. Null: the slab is all there is.
+    const column_ends* columns = nullptr;
+
+    [[nodiscard]] bool wants(target id) const { return std::find(targets.begin(), targets.end(), id) != targets.end(); }
+    [[nodiscard]] bool wants_colors() const { return std::any_of(targets.begin(), targets.end(), is_color); }
+};
+
+// A volume of the grid's extent and place, without channels.
+[[nodiscard]] inline volume volume_of(const voxelpipe::grid& grid) {
+    volume made;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto a = static_cast<glm::length_t>(axis);
+        made.extent[axis] = grid.extent[a];
+        made.origin[axis] = grid.part_origin()[a];
+        made.voxel_size[axis] = grid.voxel_size[a];
+    }
+    return made;
+}
+
+struct voxelize_stats {
+    std::string backend;                 // "cpu" or "cuda"
+    std::string device;                  // the GPU's name
+    int devices = 0;                     // GPUs that worked
+    voxelpipe::strategy_choice strategy; // of the last call on a GPU
+    std::string no_cuda;                 // why the choice between the two fell on the CPU
+    std::string estimate;                // what the choice between the two went by; empty where there was none
+    std::uint64_t device_memory = 0;     // the most that was held there, in bytes
+    int threads = 0;                     // on the CPU
+    int slabs = 0;
+    // Slabs drawn for passes over all of them, where processes and later runs share these; none: they share none.
+    std::optional<std::uint64_t> pass_slabs;
+    std::uint64_t triangles = 0;
+    std::uint64_t lines = 0;               // and points
+    std::uint64_t triangles_dropped = 0;   // a position that is not finite, or too far from the grid to be snapped
+    std::uint64_t lines_dropped = 0;       // for the same reasons
+    std::uint64_t triangles_drawn = 0;     // that reach into the grid, summed over slabs; lines too
+    std::uint64_t triangles_flat = 0;      // without area, which conservative coverage alone draws; summed over slabs
+    std::uint64_t fragments = 0;           // kept, over all voxels; of a solid's surface where that is drawn
+    std::uint64_t fragments_discarded = 0; // by an alpha mask
+    std::uint64_t voxels = 0;              // with at least one fragment; of a solid where that is asked for
+    std::optional<solid_counts> solid;     // where that is asked for
+    std::uint64_t normals_cancelled = 0;   // voxels whose normals cancel out, or that have none; with --target normal
+    std::vector<std::pair<std::string, double>> milliseconds; // stage -> time, in pipeline order
+    std::vector<std::string> warnings;                        // one line each
+};
+
+// The backend was not built, there is no device for it, or it cannot draw in the way that was asked for.
+struct backend_error : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+// Consumes the scene: its arrays move to the backend. The backend `automatic` is the first GPU where that can be used
+// and the work takes longer on the CPU, by backend_estimate.hpp; a warning where only the GPU's memory was too small.
+// Throws memory_error, backend_error, and std::runtime_error for what the library refuses.
+[[nodiscard]] volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats);
+
+// The reason why no voxel is covered, one line; for stats that count none. low, high: the model's bounds.
+[[nodiscard]] std::string why_empty(const voxelize_stats& stats, const voxelize_request& request, const glm::dvec3& low,
+                                    const glm::dvec3& high);
+
+// One line on normals that cancel; empty where none do.
+[[nodiscard]] std::string cancelled_warning(const voxelize_stats& stats);
+
+// Bytes of the volume that a request gives.
+[[nodiscard]] double volume_bytes(const voxelize_request& request);
+// Bytes that a dense run of this model on the CPU comes to, beyond those that are held before it, about.
+[[nodiscard]] double dense_need(const scene& model, const voxelize_request& request);
+// The same without what the model's vertices and triangles take, which bricks do not spare.
+[[nodiscard]] double dense_need(const voxelize_request& request);
+// Throws memory_error where the vertices of all instances, which are snapped before anything is drawn, do not fit
+// beside `result` bytes.
+void require_vertices(const scene& model, const voxelize_request& request, double result);
+
+} // namespace voxelize

@@ -1,0 +1,84 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// voxelize INPUT.glb -o OUT... [options]: turns a glTF model into voxels. See --help.
+#include "model/exit_code.hpp"
+#include "model/memory.hpp"
+#include "model/model_error.hpp"
+#include "run/batch.hpp"
+#include "run/command_line.hpp"
+#include "run/output_check.hpp"
+#include "run/run_model.hpp"
+
+#include <chrono>
+#include <csignal>
+#include <iostream>
+
+namespace voxelize {
+namespace {
+
+int fail(exit_code code, const std::string& why) {
+    std::cerr << "voxelize: " << why << '\n';
+    return code;
+}
+
+void print_warnings(const std::vector<std::string>& warnings) {
+    for (const std::string& warning : warnings) std::cerr << "voxelize: warning: " << warning << '\n';
+}
+
+void print(const command_line& options, const run_report& report) {
+    if (!options.quiet) {
+        print_warnings(report.warnings);
+        // Standard output belongs to the object where one is asked for.
+        std::ostream& stream = options.stats == stats_format::json ? std::cerr : std::cout;
+        const glm::ivec3 extent = report.request.grid.extent;
+        for (const std::filesystem::path& file : report.files) stream << "wrote " << file.string() << '\n';
+        if (!report.files.empty())
+            stream << report.stats.voxels << " of " << extent.x << " x " << extent.y << " x " << extent.z
+                   << " voxels are covered\n";
+        if (report.is_sparse && report.bricks != 0)
+            stream << "they lie in " << report.bricks << " bricks of 8 x 8 x 8, "
+                   << memory::mebibytes(static_cast<double>(report.brick_bytes)) << " with their values\n";
+    }
+    if (options.stats == stats_format::text) print_text(std::cout, report);
+    if (options.stats == stats_format::json) print_json(std::cout, report);
+}
+
+int run_main(int argc, char** argv) {
+    const auto begin = std::chrono::steady_clock::now();
+    command_line options;
+    try {
+        options = parse_command_line(argc, argv);
+    } catch (const early_exit& text) {
+        std::cout << text.text;
+        return exit_ok;
+    } catch (const usage_error& error) {
+        return fail(exit_usage, std::string(error.what()) + "\nTry: voxelize --help");
+    }
+    if (!options.batch.list.empty()) {
+        try {
+            return run_batch(options);
+        } catch (const output_conflict& error) {
+            return fail(exit_usage, error.what());
+        } catch (const model_error& error) {
+            return fail(exit_input, error.what());
+        } catch (const std::exception& error) {
+            return fail(exit_output, error.what());
+        }
+    }
+    memory::set_limit(options.max_memory, options.max_memory != 0);
+    const run_outcome result = run_model(options, begin);
+    if (result.code == exit_ok) {
+        print(options, result.report);
+        return exit_ok;
+    }
+    if (!options.quiet && result.code == exit_input) print_warnings(result.report.warnings);
+    return fail(result.code, result.error);
+}
+
+} // namespace
+} // namespace voxelize
+
+int main(int argc, char** argv) {
+    std::signal(SIGXFSZ, SIG_IGN); // a file beyond the limit of the shell fails like one on a full disk
+    return voxelize::run_main(argc, argv);
+}

@@ -1,0 +1,45 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "scratch_bytes.hpp"
+
+#include "model_error.hpp"
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <system_error>
+#include <utility>
+
+namespace voxelize {
+
+template <class Work>
+auto scratch_bytes::named(const Work& work) const {
+    try {
+        return work();
+    } catch (const std::system_error& error) {
+        throw write_error(folder_, "temporary files for the model: " + error.code().message());
+    }
+}
+
+scratch_bytes::scratch_bytes(std::filesystem::path folder)
+    : folder_(std::move(folder)), file_(named([this] { return voxelpipe::slabs::scratch_file(folder_.string()); })) {}
+
+void scratch_bytes::append(std::span<const std::byte> bytes) {
+    constexpr std::size_t block = std::size_t{1} << 20;
+    pending_.insert(pending_.end(), bytes.begin(), bytes.end());
+    if (pending_.size() >= block) flush();
+}
+
+void scratch_bytes::read(std::uint64_t offset, std::span<char> bytes) {
+    if (!pending_.empty()) flush();
+    named([&] { file_.read(offset, std::as_writable_bytes(bytes)); });
+}
+
+void scratch_bytes::flush() {
+    const std::array<std::span<const std::byte>, 1> parts{pending_};
+    file_.write(file_.extend(pending_.size()), parts);
+    named([&] { file_.check(); });
+    pending_.clear();
+}
+
+} // namespace voxelize

@@ -1,0 +1,35 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "model_file.hpp"
+
+#include "assimp_scene.hpp"
+#include "model/memory.hpp"
+#include "read/assimp/file_name.hpp"
+
+#include <algorithm>
+
+namespace voxelize {
+
+namespace {
+
+void scale_lengths(scene& model, double scale) {
+    if (scale == 1) return;
+    for (instance& shown : model.instances) {
+        shown.to_world = affine::scaling(scale).after(shown.to_world);
+        if (!shown.to_world.is_finite()) throw model_error("--scale is too large for the model");
+    }
+}
+
+} // namespace
+
+scene load_model(const std::filesystem::path& file, const load_options& options) {
+    const load_hooks hooks{[&](scene& model) { scale_lengths(model, options.scale); }, options.picture_hook};
+    const std::string extension = assimp::lower_extension(file);
+    if (!is_for_assimp(extension)) return load_gltf(file, options.limits, options.gltf, hooks);
+    if (options.gltf.animation) throw model_error("--animation is for glTF models");
+    gltf_limits limits = options.limits;
+    limits.room = std::min(limits.room, memory::room());
+    return load_by_assimp(file, limits, options.gltf, hooks);
+}
+
+} // namespace voxelize

@@ -1,0 +1,78 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "triangle_stream.hpp"
+
+#include "gltf_stream.hpp"
+#include "model/finite.hpp"
+#include "model/memory.hpp"
+#include "model/model_error.hpp"
+#include "obj_file.hpp"
+#include "ply_file.hpp"
+#include "read/assimp/file_name.hpp"
+#include "stl_file.hpp"
+
+#include <algorithm>
+
+namespace voxelize {
+
+void triangle_stream::scale_lengths(double factor) {
+    if (factor == 1) return;
+    for (part& p : parts_) {
+        p.to_world = affine::scaling(factor).after(p.to_world);
+        if (!p.to_world.is_finite()) throw model_error("--scale is too large for the model");
+    }
+}
+
+bool triangle_stream::has_texcoords() const {
+    return std::any_of(parts_.begin(), parts_.end(), [](const part& p) { return p.has_texcoords; });
+}
+
+void triangle_stream::for_each_block(const visitor& visit) {
+    for (std::size_t part = 0; part < parts_.size(); ++part) read_part(part, visit);
+}
+
+triangle_stream::boxes triangle_stream::bounds() {
+    boxes found;
+    found.own.resize(parts_.size());
+    const std::optional<std::uint64_t> counted = count_not_finite();
+    std::uint64_t corners = 0; // that are not finite
+    for_each_block([&](const block& b) {
+        const affine& place = parts_[b.part].to_world;
+        bounding_box& own = found.own[b.part];
+        for (const glm::vec3& p : b.corners) {
+            if (!is_finite(p)) {
+                ++corners;
+                continue;
+            }
+            const glm::dvec3 placed = place(glm::dvec3(p));
+            own.include({p, p, false});
+            found.placed.include({placed, placed, false});
+        }
+    });
+    if (const std::uint64_t count = counted.value_or(corners); count != 0)
+        warnings_.push_back(std::to_string(count) + ' ' + not_finite);
+    return found;
+}
+
+void triangle_stream::add_only_part(const std::filesystem::path& file, std::uint64_t num_triangles) {
+    materials_.emplace_back();
+    if (num_triangles != 0) parts_.push_back({file.filename().string(), {}, 0, 0, num_triangles});
+}
+
+opened_stream open_stream(const std::filesystem::path& file, const stream_room& room,
+                          const std::filesystem::path& folder, const load_options& options) {
+    const std::string extension = assimp::lower_extension(file);
+    opened_stream opened;
+    if (extension == ".stl") opened.stream = stl_file::open(file, options.gltf.colors);
+    if (extension == ".ply") opened.stream = ply_file::open(file, room.stream, options.gltf.colors);
+    if (extension == ".obj") opened = open_obj(file, room, folder, options.limits, options.gltf);
+    if (extension == ".glb" || extension == ".gltf")
+        opened.stream = gltf_stream::open(file, room, options.limits, options.gltf);
+    // The open stream has taken some of the room.
+    const double left = std::min(room.loaded, static_cast<double>(memory::room()));
+    if (opened.stream && opened.stream->held_bytes() <= left) opened.stream = nullptr;
+    if (opened.stream) opened.stream->scale_lengths(options.scale);
+    return opened;
+}
+
+} // namespace voxelize

@@ -1,0 +1,102 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "help.hpp"
+
+#include "model/targets.hpp"
+#include "write/formats/formats.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+namespace voxelize {
+
+const char* const help_introduction =
+    "Turns a 3D model into voxels: exact coverage, several values a voxel, many file formats.\n"
+    "\n"
+    "EXAMPLES\n"
+    "  voxelize model.glb -o model.vox -o model.png -r 256\n"
+    "      coloured voxels, 256 along the longest side, for MagicaVoxel, and a picture of them\n"
+    "  voxelize model.glb -o model.npy -s 0.05 --coverage thin\n"
+    "      a thin shell of voxels of 0.05 units of the model, as a NumPy array of 0 and 1\n"
+    "  voxelize model.glb -o model.npz -t occupancy,normal,material --stats\n"
+    "      three arrays in one file, and what it took to compute them\n";
+
+std::string help_footer() {
+    std::string text = "TARGETS (--target NAME)\n";
+    const auto line = [&text](std::string_view name, std::string_view rest) {
+        text += "  " + std::string(name) + std::string(name.size() < 16 ? 16 - name.size() : 1, ' ') +
+                std::string(rest) + '\n';
+    };
+    for (const target_info& entry : target_table) {
+        std::string type(name_of(entry.type));
+        if (entry.components > 1) type += " x " + std::to_string(entry.components);
+        line(entry.name,
+             type + std::string(type.size() < 9 ? 9 - type.size() : 1, ' ') + std::string(entry.description));
+    }
+    text += "\nOUTPUTS (by extension; .npy has the shape (nz, ny, nx) or (nz, ny, nx, components))\n";
+    for (const format& entry : formats()) line(entry.extension, entry.description);
+    text +=
+        "\nGRID\n"
+        "  -r N            N voxels along the longest side of the model, as few as hold it along the others: 2 x 1 "
+        "x 1\n"
+        "                  gets 128 x 64 x 64. With --padding P, N - 2 P of them.\n"
+        "  -s S            Voxel (i, j, k) spans i S to (i + 1) S, and so on. The grid is the voxels that the "
+        "model's box\n"
+        "                  spans: 6 of 0.1 for 0.6. A layer that the box only touches is left out, unless "
+        "--coverage thin\n"
+        "                  needs it: a face in the plane between two voxels lies in the upper one.\n"
+        "  --padding P     Nothing is drawn in the P outermost layers.\n"
+        "\nSOLIDS\n"
+        "  A voxel is inside by the winding number of its centre: how often the surface goes round it. That is exact, "
+        "and needs\n"
+        "  a closed model: a warning says which share of the rows of voxels shows holes.\n"
+        "  nonzero         where it is not 0: parts may overlap, a shell in a shell that faces inward is a cavity\n"
+        "  even_odd        where it is odd: overlaps are holes, every shell in a shell is a cavity\n"
+        "  positive        where it is more than 0: parts that are inside out are nothing\n"
+        "  each_draw       even_odd for every mesh primitive of every node by itself, united\n"
+        "  Inside, normal is 0, material and triangle are -1, depth is NaN, count is the number of bodies: 1, with "
+        "each_draw\n"
+        "  more where they overlap. Alpha masks cut no holes into a solid.\n"
+        "\nMANY MODELS (--list FILE)\n"
+        "  {name} is the name of the model's file without its extension; equal names get -2, -3, ... in the order of "
+        "the list.\n"
+        "  Beside the outputs, manifest.RANK.jsonl gets a line for each model: input, outputs, status, counts, hash, "
+        "ms. A later\n"
+        "  run of the same command leaves out what is finished. A model that fails stops nothing; the exit code is 2 "
+        "at the end.\n"
+        "\nLARGE MODELS\n"
+        "  An OBJ, a binary STL or PLY or a plain glTF file that does not fit --max-memory goes through temporary "
+        "files.\n"
+        "  With --resume, with --world-size and under mpiexec one model is drawn and written into a .zarr in slabs of "
+        "256\n"
+        "  layers, or into a .pvti piece by piece. Processes share the slabs; the same command goes on where a run "
+        "was\n"
+        "  stopped.\n"
+        "\nEXIT CODES\n"
+        "  0 done   1 wrong command line   2 the model, or the list, cannot be used   3 not enough memory\n"
+        "  4 an output cannot be written   5 --backend cuda cannot be used   70 a bug of this program\n"
+        "  5 is: built without CUDA, no driver, a driver too old, no GPU, or one that there is no code for; too\n"
+        "  little memory on the GPU is 3, as on the machine. With --backend auto the CPU does the work instead.\n";
+    return text;
+}
+
+std::string wrapped(const std::string& text, std::size_t width) {
+    std::string lines;
+    std::size_t column = 0;
+    for (std::size_t at = 0; at < text.size();) {
+        const std::size_t end = std::min(text.find(' ', at), text.size());
+        if (column != 0 && column + 1 + end - at > width) {
+            lines += '\n';
+            column = 0;
+        } else if (column != 0) {
+            lines += ' ';
+            ++column;
+        }
+        lines += text.substr(at, end - at);
+        column += end - at;
+        at = end + 1;
+    }
+    return lines;
+}
+
+} // namespace voxelize

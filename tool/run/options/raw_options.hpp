@@ -1,0 +1,47 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Options as they are written, before it is understood what they mean together.
+
+#include "run/command_line.hpp"
+
+#include <voxelpipe/core/coverage.hpp>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace voxelize {
+
+struct raw_options {
+    std::string resolution, origin, voxel_size, extent, image_size, background, fill_color;
+    std::optional<solid_rule> solid;
+    std::optional<solid_extent> extent_of_solid;
+    std::optional<voxelpipe::coverage> coverage;
+    std::string close_holes; // "all", or how many edges
+    std::optional<int> closing;
+    bool vote = false;
+    std::vector<std::string> targets;
+    bool no_edges = false;
+    bool no_ground = false;
+    bool no_color = false;
+};
+
+// Adds every option to APP: those that mean something alone fill OPTIONS, the others RAW. Both must outlive the
+// parsing.
+void describe(CLI::App& app, command_line& options, raw_options& raw);
+
+// Sets the options of lists and of ranks. HAS_WORLD: --world-size was given; otherwise mpiexec or srun may say it.
+// HAS_RANK: --rank was given.
+void understand_batch(command_line& options, bool has_world, bool has_rank);
+// Fills OPTIONS from RAW, in this order. They throw usage_error.
+void understand_solid(command_line& options, const raw_options& raw);
+void understand_grid(command_line& options, const raw_options& raw);
+void understand_outputs(command_line& options, const raw_options& raw);
+void understand_picture(command_line& options, const raw_options& raw);
+
+} // namespace voxelize

@@ -1,0 +1,102 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#include "write_bytes.hpp"
+
+#include "model/parallel.hpp"
+#include "write/formats/output_file.hpp"
+
+#include <algorithm>
+#include <initializer_list>
+#include <string>
+#include <string_view>
+
+namespace voxelize {
+
+namespace {
+
+// Bytes of a brick of a volume, without values.
+constexpr double brick_bytes = 80;
+
+// Bytes of a voxel: all its values, and those of its largest channel.
+struct value_bytes {
+    double all = 0, largest = 1;
+};
+value_bytes bytes_of_values(std::span<const target> targets) {
+    value_bytes bytes;
+    for (const target id : targets) {
+        const double value = static_cast<double>(size_of(info_of(id).type)) * info_of(id).components;
+        bytes.all += value;
+        bytes.largest = std::max(bytes.largest, value);
+    }
+    return bytes;
+}
+
+// What was measured of each kind of writer, on top of its volume.
+
+// Two sides of each voxel of a surface: lists of faces, then quads and vertices.
+double bytes_of_mesh(const expected_result& result, double voxels, double threads) {
+    constexpr double of_voxel = 175, of_corner = 4;
+    return of_voxel * voxels + threads * of_corner * result.extent.x * result.extent.y;
+}
+
+double bytes_of_picture(const preview_options& options) {
+    constexpr double of_pixel = 100, of_first_pixels = 200, most_of_these = 12 << 20;
+    const double pixels = static_cast<double>(options.width) * options.height;
+    return of_pixel * pixels + std::min(of_first_pixels * pixels, most_of_these);
+}
+
+// Text of a vertex with its colour, and of a voxel, in strings that grow.
+constexpr double of_line_of_mesh = 75, of_line_of_point = 40;
+
+// A count and an index for each colour of 24 bits.
+constexpr double bytes_of_palette = 80 << 20;
+
+// What is compressed at once, and waits to be written, of each thread; and what any writer takes.
+constexpr double bytes_of_thread = 2 << 20, bytes_of_any = 3 << 20;
+
+bool is_one_of(const std::string& extension, std::initializer_list<std::string_view> list) {
+    return std::find(list.begin(), list.end(), extension) != list.end();
+}
+
+} // namespace
+
+double bytes_to_write(const std::filesystem::path& output, const expected_result& result,
+                      const write_options& options) {
+    const std::string extension = lower_extension(output);
+    const value_bytes values = bytes_of_values(result.targets);
+    const double threads = thread_count(options.threads);
+    double bricks = result.bricks, voxels = result.voxels, bytes = bytes_of_any;
+    if (is_one_of(extension, {".npz", ".vti", ".pvti", ".nrrd", ".schem", ".html"})) bytes += threads * bytes_of_thread;
+    if (extension == ".zarr") {
+        constexpr double chunk_voxels = 64 * 64 * 64, copies = 2.3; // as it is, and with room for what it becomes
+        bytes += threads * (bytes_of_thread / 2 + copies * chunk_voxels * values.largest);
+    }
+    const bool reads_tiles = is_one_of(extension, {".nvdb", ".vdb", ".vti", ".pvti", ".nrrd", ".zarr"});
+    if (!reads_tiles && result.in_tiles > 0) { // a second volume, and a list of its bricks
+        constexpr double source_bytes = 24, brick_voxels = 512;
+        bricks += result.in_tiles / brick_voxels;
+        voxels += result.in_tiles;
+        bytes += (brick_bytes + source_bytes) * bricks + values.all * voxels;
+    }
+    const bool shows_shape = is_one_of(extension, {".vox", ".schem", ".binvox", ".glb", ".obj", ".ply", ".xyz"});
+    if (!result.is_sparse && (shows_shape || is_one_of(extension, {".html", ".nvdb", ".vdb"}))) {
+        constexpr double found_bytes = 90; // the bricks of each layer before they are sorted
+        bytes += (brick_bytes + found_bytes) * bricks;
+        if (!shows_shape) bytes += values.all * voxels;
+    }
+    if (is_one_of(extension, {".glb", ".obj"}) || (extension == ".ply" && !options.points))
+        bytes += bytes_of_mesh(result, voxels, threads);
+    constexpr double items_at_once = 4 * 32768; // formatted by each thread
+    if (extension == ".obj") bytes += of_line_of_mesh * std::min(2 * voxels, threads * items_at_once);
+    if (extension == ".xyz") bytes += of_line_of_point * std::min(voxels, threads * items_at_once);
+    const bool has_colors = std::any_of(result.targets.begin(), result.targets.end(), is_color);
+    if (extension == ".vox" && has_colors) bytes += bytes_of_palette;
+    if (extension == ".png") bytes += bytes_of_picture(options.preview);
+    if (extension == ".zarr" && options.levels) {
+        constexpr double block_voxels = 128 * 128 * 128, levels = 1.2;
+        bytes += threads * block_voxels * levels * values.largest;
+    }
+    return bytes;
+}
+
+} // namespace voxelize

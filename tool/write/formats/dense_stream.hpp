@@ -1,0 +1,39 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Hands a channel out in pieces, in storage order (x fastest): bits become bytes 0 and 1 on the way, half floats become
+// floats where a format has no half. No second dense copy is ever made; a piece is about a megabyte.
+
+#include "model/volume.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+namespace voxelize {
+
+// A format's treatment of half floats.
+enum class half_floats { keep, widen };
+
+// Receives the next piece; it is valid only during the call.
+using byte_sink = std::function<void(std::span<const std::byte>)>;
+
+// Type of the streamed values: u8 for a bit channel, f32 for a widened f16 one, otherwise the channel's own.
+[[nodiscard]] scalar streamed_type(scalar type, half_floats halves);
+
+// Bytes that the whole stream has.
+[[nodiscard]] std::uint64_t streamed_bytes(const volume& v, const channel& c, half_floats halves);
+
+// Bytes [begin, begin + size) of the stream, which must be in it. They lie in the channel itself where it is streamed
+// as it is, otherwise in `room`, which is resized to hold them. Several threads may read one channel.
+[[nodiscard]] std::span<const std::byte> streamed_piece(const volume& v, const channel& c, half_floats halves,
+                                                        std::uint64_t begin, std::size_t size,
+                                                        std::vector<std::byte>& room);
+
+// Calls `sink` with one piece after the other until the channel is through.
+void stream_values(const volume& v, const channel& c, half_floats halves, const byte_sink& sink);
+
+} // namespace voxelize

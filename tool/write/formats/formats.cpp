@@ -1,0 +1,150 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "formats.hpp"
+
+#include "binvox.hpp"
+#include "mesh.hpp"
+#include "npy.hpp"
+#include "npz.hpp"
+#include "nrrd.hpp"
+#include "png.hpp"
+#include "schem.hpp"
+#include "text.hpp"
+#include "vox.hpp"
+#include "voxel_shape.hpp"
+#include "vti.hpp"
+#include "zarr.hpp"
+
+#include "write/page/page.hpp"
+#include "write/sparse_formats.hpp"
+
+#include <array>
+#include <cmath>
+#include <string>
+
+namespace voxelize {
+namespace {
+
+// A writer takes dense channels, or the occupied voxels and their colours.
+struct writer {
+    std::vector<std::filesystem::path> (*of_channels)(const volume&, const std::filesystem::path&,
+                                                      const write_options&) = nullptr;
+    std::vector<std::filesystem::path> (*of_shape)(const voxel_shape&, const std::filesystem::path&,
+                                                   const write_options&) = nullptr;
+    // The names of its files; null: the path alone.
+    written_names (*names)(const volume&, const std::filesystem::path&, const write_options&, held_as) = nullptr;
+};
+
+constexpr auto all_formats = std::to_array<format>({
+    {".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several", false, true, false, false},
+    {".npz", "NumPy archive with one array for each channel", false, true, false, false},
+    {".vox", "MagicaVoxel model, split above 256 voxels, 255 colours", true, false, true, true},
+    {".schem", "Minecraft schematic (Sponge 2, WorldEdit) of concrete, wool, terracotta", true, false, true, true},
+    {".binvox", "binvox occupancy, padded to a cube", true, false, false, true},
+    {".vti", "VTK image data for ParaView, all channels as cell data", false, true, false, false},
+    {".pvti", "the same in pieces of some layers each, OUT.1.vti, ...; see --pieces", false, true, false, false, false,
+     false, true},
+    {".nrrd", "NRRD for 3D Slicer and teem; OUT.CHANNEL.nrrd for several", false, true, false, false},
+    {".zarr", "Zarr 3 group with a compressed array for each channel, in shards of 256^3; see --levels", false, true,
+     false, false, false, true},
+    {".glb", "glTF mesh of the voxels' outer sides, with colours; see --merge", true, false, true, false},
+    {".obj", "the same as a Wavefront OBJ of quads, colours at the vertices", true, false, true, false},
+    {".ply", "the same as a PLY of quads; with --points the centres of the voxels", true, false, true, false},
+    {".xyz", "centres of the voxels as text: x y z and red green blue, 0 to 255", true, false, true, false},
+    {".png", "shaded picture of the voxels", true, false, true, false},
+    {".html", "a page that shows the voxels in a browser: turn, cut, choose values", true, true, true, false},
+    {".nvdb", "NanoVDB: a grid for each channel, of the occupied voxels alone", true, true, true, false, true, false,
+     true},
+#ifdef VOXELIZE_HAS_OPENVDB
+    {".vdb", "the same for OpenVDB, colours in linear light", true, true, true, false, true},
+#endif
+});
+constexpr auto all_writers = std::to_array<writer>({
+    {write_npy, nullptr, npy_names},
+    {write_npz},
+    {nullptr, write_vox},
+    {nullptr, write_schem},
+    {nullptr, write_binvox},
+    {write_vti},
+    {write_pvti, nullptr, pvti_names},
+    {write_nrrd, nullptr, channel_names},
+    {write_zarr, nullptr, zarr_names},
+    {nullptr, write_glb, mesh_names},
+    {nullptr, write_obj, mesh_names},
+    {nullptr, write_ply, mesh_names},
+    {nullptr, write_xyz},
+    {write_png},
+    {write_page},
+    {write_nvdb},
+#ifdef VOXELIZE_HAS_OPENVDB
+    {write_vdb},
+#endif
+});
+static_assert(all_formats.size() == all_writers.size());
+
+std::size_t number_of(const format& f) { return static_cast<std::size_t>(&f - all_formats.data()); }
+
+const format& known_format(const std::filesystem::path& path) {
+    if (const format* const f = find_format(path); f != nullptr) return *f;
+    std::string known;
+    for (const format& each : all_formats) known += (known.empty() ? "" : ", ") + std::string(each.extension);
+    throw write_error(path, "no writer for this extension; there are " + known);
+}
+
+void check_cubes(const format& f, const std::array<double, 3>& voxel_size, const std::filesystem::path& path) {
+    if (!f.needs_cubes || are_cubic(voxel_size)) return;
+    const auto& [x, y, z] = voxel_size;
+    throw write_error(path, std::string(f.extension) + " has one voxel size for all axes, but this grid's are " +
+                                number(x) + ", " + number(y) + " and " + number(z));
+}
+
+} // namespace
+
+bool are_cubic(const std::array<double, 3>& voxel_size) {
+    constexpr double tolerance = 1e-9; // relative
+    const auto [x, y, z] = voxel_size;
+    return std::abs(x - y) <= tolerance * x && std::abs(x - z) <= tolerance * x;
+}
+
+std::span<const format> formats() { return all_formats; }
+
+const format* find_format(const std::filesystem::path& path) {
+    const std::string extension = lower_extension(path);
+    for (const format& f : all_formats)
+        if (f.extension == extension) return &f;
+    return nullptr;
+}
+
+std::vector<std::filesystem::path> write(const volume& v, const std::filesystem::path& path,
+                                         const write_options& options) {
+    const format& f = known_format(path);
+    v.check();
+    if (v.channels.empty()) throw write_error(path, "there is no channel to write");
+    if (f.needs_occupancy && v.occupancy() == nullptr)
+        throw write_error(path, std::string(f.extension) + " needs the occupancy");
+    check_cubes(f, v.voxel_size, path);
+    const writer& w = all_writers[number_of(f)];
+    if (w.of_shape != nullptr) return w.of_shape(voxel_shape(v, options.threads), path, options);
+    return w.of_channels(v, path, options);
+}
+
+written_names names_of(const volume& shape, const std::filesystem::path& path, const write_options& options,
+                       held_as held) {
+    const writer& w = all_writers[number_of(known_format(path))];
+    return w.names != nullptr ? w.names(shape, path, options, held) : written_names{{path}, {}};
+}
+
+void check_replaceable(const std::filesystem::path& path) {
+    if (const std::filesystem::path target = zarr_target(path); lower_extension(target) == ".zarr")
+        check_zarr_target(target);
+}
+
+std::vector<std::filesystem::path> write(const voxel_shape& v, const std::filesystem::path& path,
+                                         const write_options& options) {
+    const format& f = known_format(path);
+    check_cubes(f, v.voxel_size, path);
+    return all_writers[number_of(f)].of_shape(v, path, options);
+}
+
+} // namespace voxelize

@@ -1,0 +1,108 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The one entry to all writers: takes a volume and a path, picks the format by the extension, writes whole files or
+// none.
+
+#include "model/volume.hpp"
+#include "output_file.hpp" // write_error
+#include "write/preview.hpp"
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace voxelize {
+
+struct write_options {
+    int compression = 1; // zlib level of .npz, .vti, .nrrd, .zarr, .schem: 0 stores (.schem: 1), 9 is smallest
+    bool zstd = false;   // .zarr: Zstandard instead of gzip, where has_zstd()
+    bool levels = false; // .zarr: each channel with its mip levels, an OME-Zarr multiscale group
+    int pieces = 0;      // .pvti, .nvdb: slabs along z, each a piece or a grid of each channel; 0: as these say:
+    std::uint64_t piece_bytes = 1 << 30;         // .pvti: of values in a piece, about
+    std::uint64_t leaves_per_grid = 0xffff'ffff; // .nvdb: most bricks in a grid; the format has no more
+    up_axis up = up_axis::y;                     // which world axis stands upright in .vox and .schem; glTF's is y
+    int threads = 0;                             // 0 takes all cores. No output depends on it
+    bool merge_faces = false;             // .ply, .obj, .glb: coplanar faces of equal colour become one rectangle
+    bool points = false;                  // .ply holds the voxels' centres, not their outer sides
+    bool lists = true;                    // .npy, .npz of a sparse volume list its voxels; false: they hold the grid
+    std::uint64_t faces_per_file = 0;     // .ply, .obj, .glb: most faces in a file; 0: what the format can number
+    preview_options preview;              // camera and light of .png
+    std::function<void(double)> progress; // called with 0..1 now and then, from the calling thread; may be empty
+    // Called with a line that names the file, where it is written but readers of its format do not show all of it; from
+    // the calling thread; may be empty.
+    std::function<void(const std::string&)> warn;
+};
+
+// The facts of a format that --help shows and that are checked before the tool starts to compute.
+struct format {
+    std::string_view extension;   // lower case, with the dot
+    std::string_view description; // one line
+    bool needs_occupancy;         // without the "occupancy" channel the writer refuses
+    bool all_channels;            // false: occupancy, with "color" where the format has colours
+    bool shows_colors;            // takes the colours of find_colors() where there are any
+    bool needs_cubes;             // knows one voxel size for all axes: without are_cubic() the writer refuses
+    bool only_sparse = false;     // holds the voxels that are occupied and no others
+    bool has_levels = false;      // obeys write_options::levels
+    bool has_pieces = false;      // obeys write_options::pieces
+};
+
+// True if voxels of this size are cubes, but for what fitting a grid loses by rounding.
+[[nodiscard]] bool are_cubic(const std::array<double, 3>& voxel_size);
+
+// True if this program was built with libzstd.
+[[nodiscard]] bool has_zstd();
+
+// In the order in which --help lists them.
+[[nodiscard]] std::span<const format> formats();
+
+// By the extension of the path, in either case; null when no writer has it.
+[[nodiscard]] const format* find_format(const std::filesystem::path& path);
+
+// Writes the volume and returns the paths of the files, in channel order: one, or several where the format holds one
+// channel a file (OUT.CHANNEL.npy, OUT.CHANNEL.nrrd). Throws write_error when the extension is unknown, a channel that
+// the format needs is missing, the volume does not fit the format, or the disk refuses; std::invalid_argument when the
+// volume itself is inconsistent. In all these cases no file of this call is left behind.
+std::vector<std::filesystem::path> write(const volume& v, const std::filesystem::path& path,
+                                         const write_options& options = {});
+
+// Names that differ in a number alone: FOLDER/PREFIX1SUFFIX to FOLDER/PREFIXnSUFFIX, where n is `count`.
+struct numbered_names {
+    std::filesystem::path folder;
+    std::string prefix, suffix;
+    std::uint64_t count = UINT64_MAX;
+
+    [[nodiscard]] std::filesystem::path name(std::uint64_t n) const {
+        return folder / (prefix + std::to_string(n) + suffix);
+    }
+};
+
+// The files that an output becomes.
+struct written_names {
+    std::vector<std::filesystem::path> files; // one for certain, or several
+    std::vector<numbered_names> numbered;     // those that may be there, too, where their number is not known before
+};
+
+// How .npy and .npz hold a volume.
+enum class held_as : std::uint8_t { grid, list, unknown };
+
+// What write() and write_sparse() may write to `path`: asked for before anything is drawn, so that no output replaces
+// another, or a file that is read. `shape` has extent and channels without values; an extent of 0 is not known yet.
+[[nodiscard]] written_names names_of(const volume& shape, const std::filesystem::path& path,
+                                     const write_options& options, held_as held);
+// Throws write_error if what is at `path` was not written by this tool and must not be replaced: a folder of .zarr.
+void check_replaceable(const std::filesystem::path& path);
+
+// The same of occupied voxels and their colours (voxel_shape.hpp), for formats that show those alone: all but .npy,
+// .npz, .vti, .pvti, .nrrd, .zarr, .png, .html, .nvdb and .vdb.
+class voxel_shape;
+std::vector<std::filesystem::path> write(const voxel_shape& v, const std::filesystem::path& path,
+                                         const write_options& options);
+
+} // namespace voxelize

@@ -1,0 +1,122 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+#include "output_file.hpp"
+
+#include "part.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <limits>
+#include <system_error>
+#include <utility>
+
+namespace voxelize {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t buffer_bytes = std::size_t{1} << 20;
+
+// The same open file again, or -1: its lock holds as long as one of both is open.
+int again(int file) { return ::fcntl(file, F_DUPFD_CLOEXEC, 0); }
+
+} // namespace
+
+output_file::output_file(const fs::path& target) : target_(target), real_(target) {
+    std::error_code error;
+    if (fs::is_symlink(target_, error)) {
+        const fs::path resolved = fs::weakly_canonical(target_, error);
+        if (!error) real_ = resolved;
+    }
+    const fs::file_status status = fs::status(real_, error);
+    if (fs::is_directory(status)) fail("open", EISDIR);
+    if (fs::exists(status) && !fs::is_regular_file(status)) {
+        file_ = std::fopen(real_.c_str(), "wb");
+        if (file_ == nullptr) fail("open", errno);
+    } else {
+        try {
+            locked_part part = open_part_file(real_);
+            temporary_ = part.path();
+            file_ = ::fdopen(part.file(), "wb");
+            if (file_ != nullptr) (void)part.take_file();
+        } catch (const std::system_error& failure) {
+            fail("open", failure.code().value());
+        }
+        if (file_ == nullptr) {
+            const int reason = errno;
+            fs::remove(temporary_, error);
+            fail("open", reason);
+        }
+    }
+    std::setvbuf(file_, nullptr, _IOFBF, buffer_bytes);
+}
+
+output_file::~output_file() {
+    if (!temporary_.empty()) { // before another process can take it
+        std::error_code ignored;
+        fs::remove(temporary_, ignored);
+    }
+    if (file_ != nullptr) std::fclose(file_);
+    if (lock_ >= 0) ::close(lock_);
+}
+
+void output_file::fail(std::string_view action, int error) const {
+    throw write_error(target_, std::string(action) + ": " + std::generic_category().message(error));
+}
+
+void output_file::write(std::span<const std::byte> bytes) {
+    if (bytes.empty()) return;
+    if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail("write", errno);
+    at_ += bytes.size();
+}
+
+void output_file::seek(std::uint64_t at) {
+    if (at > static_cast<std::uint64_t>(std::numeric_limits<long>::max())) fail("seek", EFBIG);
+    if (std::fseek(file_, static_cast<long>(at), SEEK_SET) != 0) fail("seek", errno);
+    at_ = at;
+}
+
+void output_file::close() {
+    if (file_ == nullptr) return;
+    if (!temporary_.empty()) lock_ = again(::fileno(file_));
+    std::FILE* closing = file_;
+    file_ = nullptr;
+    if (std::fclose(closing) != 0) fail("write", errno);
+}
+
+void output_file::commit() {
+    close();
+    if (temporary_.empty()) return;
+    std::error_code error;
+    fs::rename(temporary_, real_, error);
+    if (error) fail("rename", error.value());
+    temporary_.clear();
+    ::close(std::exchange(lock_, -1));
+}
+
+std::vector<fs::path> commit_all(std::span<const std::unique_ptr<output_file>> files) {
+    std::vector<fs::path> paths;
+    for (const auto& file : files) file->close();
+    for (const auto& file : files) {
+        file->commit();
+        paths.push_back(file->target());
+    }
+    return paths;
+}
+
+std::string lower_extension(const std::filesystem::path& path) {
+    std::string extension = path.extension().string();
+    for (char& c : extension)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    return extension;
+}
+
+fs::path with_word(const fs::path& path, const std::string& word) {
+    return path.parent_path() / (path.stem().string() + "." + word + path.extension().string());
+}
+
+} // namespace voxelize

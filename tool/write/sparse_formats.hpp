@@ -1,0 +1,35 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Writers of sparse volumes. .nvdb holds a grid for each channel (occupancy as a mask); .vdb see vdb.hpp. .npz holds
+// coords, (n, 3) int32 with columns x, y and z, in the Morton order of the voxels, and an array for each channel but
+// the occupancy; .npy holds the coords, and each channel in a file of its own beside it. Without write_options::lists
+// both hold the dense grid. .png is drawn from the bricks. .vti, .pvti, .nrrd, .zarr and these read the bricks as if
+// they were dense, piece by piece; formats of shapes (voxel_shape.hpp) read the bricks themselves. No output makes a
+// dense volume.
+
+#include "model/sparse_volume.hpp"
+#include "write/formats/formats.hpp"
+
+#include <filesystem>
+#include <vector>
+
+namespace voxelize {
+
+// Formats that hold occupied voxels alone.
+[[nodiscard]] bool is_sparse_format(const std::filesystem::path& path);
+// As write() of formats.hpp, for a sparse volume.
+std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const std::filesystem::path& path,
+                                                const write_options& options);
+
+#ifdef VOXELIZE_HAS_OPENVDB
+// The occupied voxels of a dense volume as .vdb.
+std::vector<std::filesystem::path> write_vdb(const volume& v, const std::filesystem::path& path,
+                                             const write_options& options);
+#endif
+// The same as .nvdb.
+std::vector<std::filesystem::path> write_nvdb(const volume& v, const std::filesystem::path& path,
+                                              const write_options& options);
+
+} // namespace voxelize
