@@ -162,7 +162,7 @@ void expect_no_cuda(const std::string& reason) {
     EXPECT_EQ("", automatic.err);
     const auto stats = nlohmann::json::parse(automatic.out);
     EXPECT_EQ("cpu", stats["backend"]);
-    EXPECT_EQ(reason, stats["no_cuda"]);
+    EXPECT_EQ(reason, stats["no_cuda"].get<std::string>());
     EXPECT_FALSE(stats.contains("device"));
     EXPECT_EQ(read_file(folder / "cpu.npz"), read_file(folder / "auto.npz"));
 
