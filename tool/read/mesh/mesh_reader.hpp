@@ -8,6 +8,7 @@
 // throws model_error where the file cannot be read. Messages say the line or byte, the thing and what was expected.
 
 #include "model/scene.hpp"
+#include "model/texture_transform.hpp"
 #include "read/assimp/wire.hpp"
 #include "read/gltf_scene.hpp"
 #include "read/vertex_cache.hpp"
@@ -27,6 +28,9 @@ namespace voxelize {
 // A surface whose file gives it no colour is white, whatever the format: the base colour of a material{}.
 inline constexpr glm::vec4 default_color{1.0F};
 
+// The kept texture coordinates run downwards, those of the formats upwards.
+inline constexpr texture_transform upside_down{1, 0, 0, 0, -1, 1};
+
 // Triangles, lines and points of one name and one material.
 struct mesh_part {
     std::string name;
@@ -42,7 +46,7 @@ struct mesh_description {
     bool has_vertex_colors = false;               // mesh_vertex::color counts
     bool has_vertex_texcoords = false;            // mesh_vertex::texcoord counts
     bool has_face_colors = false;                 // mesh_face::color counts
-    bool has_corner_texcoords = false;            // mesh_corner::texcoord counts
+    bool has_corner_texcoords = false;            // mesh_corner::texcoord counts; not both
     std::vector<std::string> warnings;            // one line each
     std::vector<std::string> files;               // that were read beside the model's own, relative to its folder
 };
@@ -90,7 +94,8 @@ public:
     mesh_reader& operator=(const mesh_reader&) = delete;
     virtual ~mesh_reader() = default;
 
-    // Complete after read_vertices(), but for warnings and files, which the passes may add to.
+    // What it says of the positions and of what counts holds before read_vertices(); parts, materials, warnings and
+    // files may come later, each part before the first face that names it.
     [[nodiscard]] const mesh_description& description() const { return description_; }
     // A guess at the numbers to come, never more than the file's bytes can hold; 0: none.
     [[nodiscard]] virtual std::uint64_t expected_vertices() const { return 0; }
@@ -110,8 +115,8 @@ public:
         std::optional<texcoord_layout> texcoords;
     };
     [[nodiscard]] virtual std::optional<layouts> vertices_in_place() const { return std::nullopt; }
-    // True if read_faces() can be called many times, is fast, gives one part alone, no line and no texcoord(). A stream
-    // copies faces into a temporary file otherwise.
+    // True if read_faces() can be called many times, is fast, gives one part alone and calls nothing but face(). A
+    // stream copies faces into a temporary file otherwise.
     [[nodiscard]] virtual bool reads_faces_again() const { return false; }
 
 protected:

@@ -3,6 +3,7 @@
 #pragma once
 // Polygons -> triangles.
 
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
 #include <cstdint>
@@ -20,8 +21,12 @@ public:
     [[nodiscard]] std::span<const glm::uvec3> cut(std::span<const glm::dvec3> corners);
 
 private:
+    void cut_ears(std::uint32_t n);
+
     std::vector<glm::uvec3> triangles_;
-    std::vector<std::uint32_t> left_; // corners that are not cut off
+    std::vector<glm::dvec2> flat_;               // the corners in their plane
+    std::vector<std::uint32_t> reflex_;          // corners at which the polygon is concave
+    std::vector<std::uint32_t> next_, previous_; // corners that are not cut off
 };
 
 } // namespace voxelize
