@@ -49,7 +49,7 @@ scene to_scene(assimp::model source, const gltf_file_reader& read_file, gltf::bu
 } // namespace
 
 bool is_for_assimp(const std::string& extension) {
-    return extension != ".gltf" && extension != ".glb" && assimp::reads(extension);
+    return extension != ".gltf" && extension != ".glb" && extension != ".obj" && assimp::reads(extension);
 }
 
 scene load_by_assimp(std::span<const std::byte> bytes, const std::string& name, const gltf_file_reader& read_file,

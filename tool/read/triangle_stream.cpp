@@ -6,9 +6,9 @@
 #include "model/finite.hpp"
 #include "model/memory.hpp"
 #include "model/model_error.hpp"
-#include "obj_file.hpp"
 #include "ply_file.hpp"
 #include "read/assimp/file_name.hpp"
+#include "read/obj/stream.hpp"
 #include "stl_file.hpp"
 
 #include <algorithm>
@@ -65,7 +65,7 @@ opened_stream open_stream(const std::filesystem::path& file, const stream_room& 
     opened_stream opened;
     if (extension == ".stl") opened.stream = stl_file::open(file, options.gltf.colors);
     if (extension == ".ply") opened.stream = ply_file::open(file, room.stream, options.gltf.colors);
-    if (extension == ".obj") opened = open_obj(file, room, folder, options.limits, options.gltf);
+    if (extension == ".obj") opened = open_obj_stream(file, room, folder, options.limits, options.gltf);
     if (extension == ".glb" || extension == ".gltf")
         opened.stream = gltf_stream::open(file, room, options.limits, options.gltf);
     // The open stream has taken some of the room.

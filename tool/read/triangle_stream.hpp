@@ -116,8 +116,8 @@ struct stream_room {
 };
 
 // The file as a stream, where it is of a kind that can be read so (stl_file.hpp, ply_file.hpp, gltf_stream.hpp,
-// obj_file.hpp) and is not likely to fit when it is loaded. folder: for temporary files, of OBJ. Throws as open_obj()
-// does.
+// obj/stream.hpp) and is not likely to fit when it is loaded. folder: for temporary files, of OBJ. Throws as
+// open_obj_stream() does.
 [[nodiscard]] opened_stream open_stream(const std::filesystem::path& file, const stream_room& room,
                                         const std::filesystem::path& folder, const load_options& options);
 

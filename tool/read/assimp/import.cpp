@@ -28,8 +28,6 @@ namespace {
 // Faults that assimp finds too late.
 void check_text(std::span<const std::byte> bytes, const std::string& extension) {
     const std::string_view text{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-    if (extension == ".obj" && (text.starts_with("\xFE\xFF") || text.starts_with("\xFF\xFE")))
-        throw std::runtime_error("the file is text in UTF-16, not UTF-8");
     // Looked for without end otherwise.
     if (extension == ".ply" && text.find("end_header") == std::string_view::npos)
         throw std::runtime_error("the PLY header has no end_header");
@@ -195,25 +193,6 @@ void read_nodes(model& result, const aiNode& root, const std::vector<std::vector
     }
 }
 
-// Without its library a material of an OBJ is only a name, and assimp's grey.
-void warn_of_libraries(model& result, const aiScene& scene, const file_system& files) {
-    const std::vector<std::string>& missing = files.missing_libraries();
-    if (missing.empty()) return;
-    bool any_is_known = false;
-    for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
-        aiString name;
-        const bool is_known =
-            scene.mMaterials[i]->Get(AI_MATKEY_NAME, name) == aiReturn_SUCCESS && files.has_material(name.C_Str());
-        any_is_known = any_is_known || is_known;
-        if (!is_known) result.materials[i].base_color = glm::vec4(1);
-    }
-    for (const std::string& library : missing)
-        result.warnings.push_back("the material library " + gltf::in_quotes(library) + " cannot be read: " +
-                                  (files.stand_in() ? gltf::in_quotes(*files.stand_in()) + " is read in its place"
-                                   : any_is_known   ? "surfaces of its materials are white"
-                                                    : "surfaces are white"));
-}
-
 // Collada's importer turns the file's units into metres.
 void warn_of_units(model& result, const aiNode& root, const std::string& extension) {
     if (extension != ".dae" && extension != ".zae") return;
@@ -245,7 +224,6 @@ model read_model(std::span<const std::byte> bytes, const std::string& name, cons
     model result;
     for (unsigned i = 0; i < scene->mNumMaterials; ++i) add_material(result, *scene->mMaterials[i], *scene);
     for (unsigned i = 0; i < scene->mNumTextures; ++i) add_embedded(result, *scene->mTextures[i]);
-    warn_of_libraries(result, *scene, *files);
     result.files = files->others();
     left_out without;
     std::vector<std::vector<std::uint32_t>> primitives_of(scene->mNumMeshes); // by mesh

@@ -130,8 +130,7 @@ bool has_alpha(const fs::path& file) {
 
 } // namespace
 
-std::vector<std::string> library_names(std::string_view rest,
-                                       const std::function<bool(const std::string&)>& is_there) {
+std::vector<std::string> library_names(std::string_view rest, const std::function<bool(const std::string&)>& is_there) {
     const std::string whole = name_of(rest);
     if (whole.empty()) return {};
     if (is_there(whole)) return {whole};
@@ -264,8 +263,8 @@ void material_list::finish_material() {
     const assimp::texture_source& texture = textures.back();
     // Exporters leave black beside a texture.
     if (is_black_ && !texture.path.empty()) made.base_color = {1, 1, 1, made.base_color.a};
-    const bool is_cut = !texture.alpha_path.empty() ||
-                        (!texture.path.empty() && has_alpha(folder_ / fs::path(texture.path)));
+    const bool is_cut =
+        !texture.alpha_path.empty() || (!texture.path.empty() && has_alpha(folder_ / fs::path(texture.path)));
     if (made.base_color.a < 1 || is_cut) made.alpha = alpha_mode::blend;
 }
 

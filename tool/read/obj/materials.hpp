@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Material libraries (MTL) of an OBJ file -> materials. A statement that is not known or cannot be read never costs more
-// than itself: the material, and the geometry that it is on, stay.
+// Material libraries (MTL) of an OBJ file -> materials. A statement that is not known or cannot be read never costs
+// more than itself: the material, and the geometry that it is on, stay.
 
 #include "model/scene.hpp"
 #include "read/assimp/wire.hpp"
@@ -71,10 +71,10 @@ private:
     const gltf_options& options_;
     std::vector<std::string> named_; // as the file names them, each once
     std::vector<used_name> used_;
-    std::map<std::string, std::uint32_t, std::less<>> numbers_;  // of used_
-    std::map<std::string, std::uint32_t, std::less<>> defined_;  // by name: index of a material
-    bool is_open_ = false;                                       // the last material takes statements
-    bool has_opacity_ = false, is_black_ = false;                // it has had d; a Kd of black
+    std::map<std::string, std::uint32_t, std::less<>> numbers_; // of used_
+    std::map<std::string, std::uint32_t, std::less<>> defined_; // by name: index of a material
+    bool is_open_ = false;                                      // the last material takes statements
+    bool has_opacity_ = false, is_black_ = false;               // it has had d; a Kd of black
 };
 
 } // namespace voxelize::obj

@@ -46,10 +46,10 @@ enum class statement : std::uint8_t {
 
 // Statements of free-form geometry, of display and of other programs, beside those above.
 constexpr std::array<std::string_view, 37> known_keys{
-    "vn",       "vp",     "s",       "mg",    "lod",    "bevel",  "c_interp", "d_interp",   "shadow_obj", "trace_obj",
-    "ctech",    "stech",  "cstype",  "deg",   "bmat",   "step",   "parm",     "trim",       "hole",       "scrv",
-    "sp",       "end",    "con",     "usemap", "maplib", "call",  "csh",      "res",        "version",    "units",
-    "vertices", "faces",  "material", "cdp",  "bsp",    "bzp",    "cdc"};
+    "vn",       "vp",    "s",        "mg",     "lod",    "bevel", "c_interp", "d_interp", "shadow_obj", "trace_obj",
+    "ctech",    "stech", "cstype",   "deg",    "bmat",   "step",  "parm",     "trim",     "hole",       "scrv",
+    "sp",       "end",   "con",      "usemap", "maplib", "call",  "csh",      "res",      "version",    "units",
+    "vertices", "faces", "material", "cdp",    "bsp",    "bzp",   "cdc"};
 
 // The statement of a line, whose key is cut off it.
 statement statement_of(std::string_view& line) {
@@ -201,8 +201,7 @@ std::uint32_t text_reader::part_at(place& at) {
                                                            static_cast<std::uint32_t>(description_.parts.size()));
     if (is_new) {
         const std::string name = !at.group.empty() ? at.group : at.object;
-        description_.parts.push_back(
-            {gltf::printable(name.empty() ? path_.filename().string() : name), at.material});
+        description_.parts.push_back({gltf::printable(name.empty() ? path_.filename().string() : name), at.material});
     }
     at.part = found->second;
     return found->second;
@@ -298,7 +297,8 @@ void text_reader::vertex(std::string_view rest, std::string_view line, std::uint
         n[count] = value.value_or(nothing);
         if (word.find('#') != std::string_view::npos && !number_of(word)) from = {};
     }
-    if (count < 3) refuse(cited(number, line) + " has " + std::to_string(count) + " numbers, and a vertex has 3 or more");
+    if (count < 3)
+        refuse(cited(number, line) + " has " + std::to_string(count) + " numbers, and a vertex has 3 or more");
     if (count >= 3 && is_wrong) refuse(cited(number, line) + " has a coordinate that is no number");
     mesh_vertex v;
     v.position = count < 3 ? glm::dvec3(nothing) : glm::dvec3(n[0], n[1], n[2]);
@@ -321,8 +321,7 @@ void text_reader::read_vertices(mesh_sink& sink) {
     for (std::string_view line; lines.next(line);) {
         std::string_view rest = line;
         const statement kind = statement_of(rest);
-        if (kind == statement::vertex && found.vertices++ < counts_.vertices)
-            vertex(rest, line, lines.number(), sink);
+        if (kind == statement::vertex && found.vertices++ < counts_.vertices) vertex(rest, line, lines.number(), sink);
         if (kind != statement::texcoord || !description_.has_corner_texcoords) continue;
         if (found.texcoords++ >= counts_.texcoords) continue;
         glm::vec2 value(0);
@@ -332,7 +331,8 @@ void text_reader::read_vertices(mesh_sink& sink) {
         }
         sink.texcoord(value);
     }
-    if (found.vertices != counts_.vertices || (description_.has_corner_texcoords && found.texcoords != counts_.texcoords))
+    if (found.vertices != counts_.vertices ||
+        (description_.has_corner_texcoords && found.texcoords != counts_.texcoords))
         throw model_error("the file changes while it is read");
     if (refused_ == 0) return;
     const std::string numbers = std::to_string(counts_.vertices - refused_) + " of the file's " +

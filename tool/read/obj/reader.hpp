@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// OBJ files -> mesh_reader. The text is read three times: for groups, materials and counts, for vertices, and for faces.
-// Faces of one object, group and material are one part, in the order of the first of each.
+// OBJ files -> mesh_reader. The text is read three times: for groups, materials and counts, for vertices, and for
+// faces. Faces of one object, group and material are one part, in the order of the first of each.
 
 #include "read/mesh/mesh_reader.hpp"
 
