@@ -6,6 +6,7 @@
 #include "model/model_error.hpp"
 #include "read/assimp/file_name.hpp"
 #include "read/gltf/resources.hpp"
+#include "read/mesh/mesh_formats.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -116,7 +117,7 @@ std::vector<fs::path> named_files(const fs::path& model) {
     const std::string extension = assimp::lower_extension(model);
     if (extension == ".obj")
         add_obj_files(model, files);
-    else if (!is_for_assimp(extension))
+    else if (!is_mesh_format(extension) && !is_for_assimp(extension))
         add_gltf_files(model, files);
     return files;
 }
