@@ -6,6 +6,7 @@
 #include "model/model_error.hpp"
 #include "read/assimp/file_name.hpp"
 #include "read/gltf/resources.hpp"
+#include "read/mesh/mesh_formats.hpp"
 #include "read/obj/lines.hpp"
 #include "read/obj/materials.hpp"
 #include "read/obj/reader.hpp"
@@ -125,7 +126,7 @@ std::vector<fs::path> named_files(const fs::path& model) {
             add_obj_files(model, files);
         } catch (const model_error&) { // it cannot be read: the loader says so
         }
-    } else if (!is_for_assimp(extension)) {
+    } else if (!is_mesh_format(extension) && !is_for_assimp(extension)) {
         add_gltf_files(model, files);
     }
     return files;

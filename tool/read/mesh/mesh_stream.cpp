@@ -162,10 +162,11 @@ void mesh_stream::read_vertices() {
     has_vertex_texcoords_ = read.has_vertex_texcoords;
     has_face_colors_ = read.has_face_colors && options_.colors;
     has_corner_texcoords_ = read.has_corner_texcoords;
-    reader_->read_vertices(*this);
+    if (!in_place_ || read.is_double) reader_->read_vertices(*this); // floats in place need no look
     std::size_t stride = 0;
     if (in_place_) {
         positions_ = placed->positions;
+        num_stored_ = positions_.count;
         colors_ = placed->colors;
         texcoords_ = placed->texcoords;
     } else {

@@ -53,7 +53,9 @@ void text_scanner::pass_line_end() {
     if (!is_line_end(c)) return;
     ++at_;
     ++line_;
-    if (c == '\r' && peek() == '\n') ++at_;
+    ended_by_cr_ = c == '\r';
+    ended_by_cr_lf_ = ended_by_cr_ && peek() == '\n';
+    if (ended_by_cr_lf_) ++at_;
 }
 
 std::string_view text_scanner::next_word() {

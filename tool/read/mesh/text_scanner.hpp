@@ -25,6 +25,9 @@ public:
     [[nodiscard]] std::string_view next_word();
     // The rest of this line, without its end. False at the end of the file. Valid until the next call.
     [[nodiscard]] bool next_line(std::string_view& line);
+    // True if the last line's end was CR, alone or with the LF behind it; true if it was both.
+    [[nodiscard]] bool ended_by_cr() const { return ended_by_cr_; }
+    [[nodiscard]] bool ended_by_cr_lf() const { return ended_by_cr_lf_; }
     // The next word of this line; empty where the line ends, which stays unread.
     [[nodiscard]] std::string_view next_word_of_line();
     // Bytes of the file, which may be fewer than asked for at its end. Valid until the next call.
@@ -53,6 +56,7 @@ private:
     std::uint64_t size_ = 0, buffer_offset_ = 0;
     std::size_t at_ = 0, end_ = 0;
     std::uint64_t line_ = 1, word_line_ = 1;
+    bool ended_by_cr_ = false, ended_by_cr_lf_ = false;
     std::string text_; // of the last word, line or bytes
 };
 

@@ -166,8 +166,8 @@ fs::path find_file(const fs::path& folder, const std::string& name, const fs::pa
     return {};
 }
 
-material_list::material_list(fs::path folder, const gltf_limits& limits, const gltf_options& options)
-    : folder_(std::move(folder)), limits_(limits), options_(options) {
+material_list::material_list(fs::path folder, const gltf_options& options)
+    : folder_(std::move(folder)), options_(options) {
     (void)add_material(default_name);
 }
 
@@ -233,7 +233,7 @@ void material_list::read_libraries(const fs::path& model) {
 
 bool material_list::read_library(const fs::path& file) {
     try {
-        (void)gltf::checked_file_size(folder_ / file, limits_.max_file_bytes);
+        (void)gltf::checked_file_size(folder_ / file, gltf_limits{}.max_file_bytes);
         line_reader lines(folder_ / file);
         files.push_back(file.generic_string());
         is_open_ = false;

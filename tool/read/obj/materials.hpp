@@ -34,7 +34,7 @@ namespace voxelize::obj {
 class material_list {
 public:
     // The first material is the default one, which is white. FOLDER is the model's.
-    material_list(std::filesystem::path folder, const gltf_limits& limits, const gltf_options& options);
+    material_list(std::filesystem::path folder, const gltf_options& options);
 
     // A statement "mtllib" with this REST; its libraries are read by read_libraries().
     void add_libraries(std::string_view rest);
@@ -67,7 +67,6 @@ private:
     std::uint32_t add_material(std::string name);
 
     std::filesystem::path folder_;
-    const gltf_limits& limits_;
     const gltf_options& options_;
     std::vector<std::string> named_; // as the file names them, each once
     std::vector<used_name> used_;

@@ -132,11 +132,11 @@ std::optional<corner_indices> corner_in(std::string_view word) {
 
 class text_reader : public mesh_reader {
 public:
-    text_reader(std::filesystem::path path, const gltf_limits& limits, const gltf_options& options)
+    text_reader(std::filesystem::path path, const gltf_options& options)
         : path_(std::move(path)), is_lenient_(options.lenient), wants_colors_(options.colors) {
-        (void)gltf::checked_file_size(path_, limits.max_file_bytes);
+        if (gltf::checked_file_size(path_, gltf_limits{}.max_file_bytes) == 0) throw model_error("the file is empty");
         description_.is_double = true;
-        read_outline(limits, options);
+        read_outline(options);
     }
 
     [[nodiscard]] std::uint64_t expected_vertices() const override { return counts_.vertices; }
@@ -145,7 +145,7 @@ public:
     void read_faces(mesh_sink& sink) override;
 
 private:
-    void read_outline(const gltf_limits& limits, const gltf_options& options);
+    void read_outline(const gltf_options& options);
     void warn_of_statements(const std::map<statement, std::pair<std::uint64_t, std::string>>& left_out);
     void vertex(std::string_view rest, std::string_view line, std::uint64_t number, mesh_sink& sink);
     void element(statement kind, std::string_view rest, std::string_view line, std::uint64_t number, mesh_sink& sink);
@@ -207,8 +207,8 @@ std::uint32_t text_reader::part_at(place& at) {
     return found->second;
 }
 
-void text_reader::read_outline(const gltf_limits& limits, const gltf_options& options) {
-    names_.emplace(path_.parent_path(), limits, options);
+void text_reader::read_outline(const gltf_options& options) {
+    names_.emplace(path_.parent_path(), options);
     place at;
     at.material = names_->use("");
     std::map<statement, std::pair<std::uint64_t, std::string>> left_out; // number of lines, and the first
@@ -457,9 +457,8 @@ obj_counts count_obj(const std::filesystem::path& path) {
     return count;
 }
 
-std::unique_ptr<mesh_reader> open_obj(const std::filesystem::path& path, const gltf_limits& limits,
-                                      const gltf_options& options) {
-    return std::make_unique<obj::text_reader>(path, limits, options);
+std::unique_ptr<mesh_reader> open_obj(const std::filesystem::path& path, const gltf_options& options) {
+    return std::make_unique<obj::text_reader>(path, options);
 }
 
 } // namespace voxelize

@@ -29,8 +29,7 @@ struct obj_counts {
 // Opens an OBJ file and reads its groups and material libraries. Throws model_error where it cannot be read. Faces with
 // indices of no vertex, and vertices without three numbers, are an error of read_vertices() and read_faces(), or with
 // options.lenient a warning.
-[[nodiscard]] std::unique_ptr<mesh_reader> open_obj(const std::filesystem::path& path, const gltf_limits& limits,
-                                                    const gltf_options& options);
+[[nodiscard]] std::unique_ptr<mesh_reader> open_obj(const std::filesystem::path& path, const gltf_options& options);
 
 namespace obj {
 

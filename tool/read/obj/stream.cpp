@@ -34,7 +34,7 @@ opened_stream open_obj_stream(const std::filesystem::path& path, const stream_ro
     if (error || most_by_byte * bytes <= room.loaded) return {};
     const obj_counts count = count_obj(path);
     if (bytes_of_run(count, likely) <= room.loaded) return {};
-    opened_stream opened = stream_of(open_obj(path, limits, options), path, room, folder, limits, options);
+    opened_stream opened = stream_of(open_obj(path, options), path, room, folder, limits, options);
     if (opened.stream || opened.refusal.empty()) return opened;
     opened.need = bytes_of_run(count, likely);
     memory::require(bytes_of_run(count, least), "the model", opened.refusal, opened.need);
