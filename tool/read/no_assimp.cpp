@@ -17,7 +17,7 @@ bool is_for_assimp(const std::string& extension) {
 
 scene load_by_assimp(const std::filesystem::path&, const gltf_limits&, const gltf_options&, const load_hooks&) {
     throw model_error(
-        "this build reads glTF and OBJ only, since it has no assimp: convert the file (`assimp export IN OUT.glb`, "
+        "this build reads glTF, OBJ, STL, PLY and OFF only, since it has no assimp: convert the file (`assimp export IN OUT.glb`, "
         "or Blender), or install libassimp-dev and build again");
 }
 

@@ -194,14 +194,28 @@ void read_nodes(model& result, const aiNode& root, const std::vector<std::vector
 }
 
 // Collada's importer turns the file's units into metres.
-void warn_of_units(model& result, const aiNode& root, const std::string& extension) {
-    if (extension != ".dae" && extension != ".zae") return;
+void warn_of_units(model& result, const aiNode& root) {
     const aiMatrix4x4& m = root.mTransformation;
     const double scale = std::cbrt(std::abs(static_cast<double>(m.Determinant())));
     if (std::abs(scale - 1) < 1e-6 || !(scale > 0)) return;
     char text[32];
     std::snprintf(text, sizeof(text), "%.6g", scale);
     result.warnings.push_back("the file's unit is " + std::string(text) + " m: lengths are in metres");
+}
+
+// It also turns the axis that the file states as upright to Y.
+void warn_of_axes(model& result, std::span<const std::byte> bytes) {
+    const std::string_view text{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+    constexpr std::string_view key = "<up_axis>", blank = " \t\r\n";
+    const std::size_t at = text.find(key);
+    if (at == std::string_view::npos) return;
+    const std::size_t value = text.find_first_not_of(blank, at + key.size());
+    if (value == std::string_view::npos) return;
+    const std::string_view axis = text.substr(value, 4);
+    if (axis == "Z_UP")
+        result.warnings.emplace_back("the file states Z as upright: it is turned to Y, so x, y, z become x, z, -y");
+    if (axis == "X_UP")
+        result.warnings.emplace_back("the file states X as upright: it is turned to Y, so x, y, z become -y, x, z");
 }
 
 } // namespace
@@ -233,7 +247,10 @@ model read_model(std::span<const std::byte> bytes, const std::string& name, cons
             result.primitives.push_back(std::move(part));
         }
     read_nodes(result, *scene->mRootNode, primitives_of, without);
-    warn_of_units(result, *scene->mRootNode, extension);
+    if (extension == ".dae" || extension == ".zae") {
+        warn_of_units(result, *scene->mRootNode);
+        warn_of_axes(result, bytes);
+    }
     const auto warn = [&](std::size_t count, const char* what) {
         if (count != 0) result.warnings.push_back(std::to_string(count) + ' ' + what);
     };

@@ -274,12 +274,12 @@ void text_reader::read_outline(const gltf_options& options) {
 void text_reader::warn_of_statements(const std::map<statement, std::pair<std::uint64_t, std::string>>& left_out) {
     for (const auto& [kind, found] : left_out) {
         const auto& [count, first] = found;
-        const std::string several = count > 1 ? ", and " + std::to_string(count - 1) + " more like it" : "";
+        const std::string several = count > 1 ? " (and " + std::to_string(count - 1) + " more)" : "";
         const char* what = "is not known and passed over";
         if (kind == statement::surface) what = "is a free-form surface, which is not drawn: export it as polygons";
         if (kind == statement::curve) what = "is a free-form curve, which is not drawn: export it as a line";
         if (kind == statement::call) what = "names another file, which is not read";
-        description_.warnings.push_back(first + several + ' ' + what);
+        description_.warnings.push_back(first + ' ' + what + several);
     }
 }
 
