@@ -6,6 +6,7 @@
 #include "file_system.hpp"
 #include "linear_color.hpp"
 #include "model/finite.hpp"
+#include "package_3mf.hpp"
 #include "read/gltf/text.hpp"
 
 #include <assimp/Importer.hpp>
@@ -18,6 +19,7 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -225,6 +227,8 @@ bool reads(const std::string& extension) { return Assimp::Importer{}.IsExtension
 model read_model(std::span<const std::byte> bytes, const std::string& name, const gltf_file_reader& read_file) {
     const std::string extension = lower_extension(name);
     check_text(bytes, extension);
+    if (extension == ".3mf")
+        if (std::optional<model> package = read_package_3mf(bytes)) return std::move(*package);
     Assimp::Importer importer;
     auto* const files = new file_system(bytes, name, read_file);
     importer.SetIOHandler(files); // the importer owns it
