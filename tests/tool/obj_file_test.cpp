@@ -5,9 +5,9 @@
 #include "two_ways.hpp"
 
 #if VOXELPIPE_TOOL_HAS_ASSIMP
-#include <assimp/obj_text.hpp>
-#include <assimp_scene.hpp>
-#include <obj_file.hpp>
+#include <read/assimp/obj_text.hpp>
+#include <read/assimp_scene.hpp>
+#include <read/obj_file.hpp>
 
 #include <gtest/gtest.h>
 
