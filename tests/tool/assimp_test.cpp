@@ -3,7 +3,7 @@
 // STL, PLY, OFF and OBJ as assimp reads them, small files written by the test; and files that are wrong.
 #include "gltf_builder.hpp"
 
-#include <assimp_scene.hpp>
+#include <read/assimp_scene.hpp>
 
 #include <gtest/gtest.h>
 

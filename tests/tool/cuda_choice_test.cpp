@@ -4,8 +4,8 @@
 // the CPU's bytes. Machines that are not at hand are played by facts, and by driver libraries that the tests bring.
 #include "tool_test.hpp"
 
-#include <backend_estimate.hpp>
-#include <cuda_device.hpp>
+#include <draw/backend_estimate.hpp>
+#include <draw/cuda_device.hpp>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>

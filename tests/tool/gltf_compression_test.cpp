@@ -3,7 +3,7 @@
 // KHR_draco_mesh_compression and EXT_meshopt_compression: what the test compresses comes back; damaged data is refused.
 #include "gltf_builder.hpp"
 
-#include <gltf_scene.hpp>
+#include <read/gltf_scene.hpp>
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 // the project, not in it: without it the same machinery runs on two files that the test writes.
 //
 // VOXELPIPE_WRITE_GLTF_TABLE=FILE in the environment writes the table of what happens now to FILE, to be reviewed.
-#include <gltf_scene.hpp>
+#include <read/gltf_scene.hpp>
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 // Files that are wrong, or hostile: each gives its one line, and none of them much memory or time.
 #include "gltf_builder.hpp"
 
-#include <gltf_scene.hpp>
+#include <read/gltf_scene.hpp>
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 // Sources of a material's colour: the alternatives that extensions bring, and the formats of pictures.
 #include "gltf_builder.hpp"
 
-#include <gltf_scene.hpp>
+#include <read/gltf_scene.hpp>
 
 #include <gtest/gtest.h>
 #include <zlib.h>

@@ -3,7 +3,7 @@
 // Morph targets, skins and animations: a model in the pose that its file states, or in that of one moment.
 #include "gltf_builder.hpp"
 
-#include <gltf_scene.hpp>
+#include <read/gltf_scene.hpp>
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 // glTF features, one small file each, written by the test.
 #include "gltf_builder.hpp"
 
-#include <gltf_scene.hpp>
+#include <read/gltf_scene.hpp>
 
 #include <gtest/gtest.h>
 

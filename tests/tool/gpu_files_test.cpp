@@ -5,7 +5,7 @@
 // Reported as not run (exit code 77) where the program finds no GPU that it can use.
 #include "tool_test.hpp"
 
-#include <cuda_device.hpp>
+#include <draw/cuda_device.hpp>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>

@@ -3,8 +3,8 @@
 // Work in a process of its own: what it gives comes back, and whatever becomes of it is a model_error.
 #include "gltf_builder.hpp"
 
-#include <isolated.hpp>
-#include <model_error.hpp>
+#include <model/model_error.hpp>
+#include <read/isolated.hpp>
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 // The budget as the program keeps it: this test has the program's operator new (memory_guard.cpp).
 #include "sanitized.hpp"
 
-#include <memory.hpp>
+#include <model/memory.hpp>
 
 #include <gtest/gtest.h>
 

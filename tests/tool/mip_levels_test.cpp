@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // Textures at the size of voxels: the levels, the footprint that chooses among them, and what a side of the grid sees.
-#include <mip_levels.hpp>
-#include <outside.hpp>
-#include <surface.hpp>
+#include <draw/mip_levels.hpp>
+#include <draw/outside.hpp>
+#include <draw/surface.hpp>
 
 #include <gtest/gtest.h>
 

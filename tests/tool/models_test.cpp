@@ -8,10 +8,10 @@
 // VOXELPIPE_WRITE_GOLDEN_VOLUMES=FILE in the environment writes the table of what is computed now, to be reviewed.
 #include "tool_test.hpp"
 
-#include <gltf_scene.hpp>
-#include <placement.hpp>
-#include <targets.hpp>
-#include <voxelizer.hpp>
+#include <draw/voxelizer.hpp>
+#include <model/placement.hpp>
+#include <model/targets.hpp>
+#include <read/gltf_scene.hpp>
 
 #include <gtest/gtest.h>
 

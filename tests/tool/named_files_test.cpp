@@ -4,8 +4,8 @@
 // makes it again.
 #include "tool_test.hpp"
 
-#include <batch.hpp>
-#include <named_files.hpp>
+#include <read/named_files.hpp>
+#include <run/batch.hpp>
 
 #include <gtest/gtest.h>
 

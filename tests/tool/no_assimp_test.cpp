@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // A build without assimp says what to do.
-#include <assimp_scene.hpp>
+#include <read/assimp_scene.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// Odd but valid files that people have, beside the shared glTF files, and what is right: voxels, colours and messages
-// of the voxelize program.
+// Odd but valid files that people have, of the folder VOXELPIPE_CASES_DIR, and what is right: voxels, colours and
+// messages of the voxelize program.
 #include "tool_runner.hpp"
 
 #include <gtest/gtest.h>
@@ -13,20 +13,18 @@
 #include <fstream>
 #include <sstream>
 #include <string>
-#include <string_view>
 #include <vector>
 
 using namespace tool_test;
 
 namespace {
 
-fs::path shared_cases() { return fs::path(VOXELPIPE_GLTF_DIR).parent_path() / "cases" / "formats"; }
+fs::path shared_cases() { return fs::path(VOXELPIPE_CASES_DIR) / "formats"; }
 
 class ObjCases : public testing::Test {
 protected:
     void SetUp() override {
-        if (std::string_view(VOXELPIPE_GLTF_DIR).empty() || !fs::exists(shared_cases() / "control.obj"))
-            GTEST_SKIP() << "no shared cases: VOXELPIPE_GLTF_DIR";
+        if (!fs::exists(shared_cases() / "control.obj")) GTEST_SKIP() << "no shared cases: VOXELPIPE_CASES_DIR";
     }
 
     // The voxels of a file in a grid of 16^3 around the unit cube, and what the program says.
@@ -106,6 +104,17 @@ TEST_F(ObjCases, MapCoordinatesAreAsSharpAsTheOrigin) {
     const auto near = array_.data;
     EXPECT_EQ(2205U, voxels_of(shared_cases() / "f12_utm.obj", grid + "431234,4649776,100"));
     EXPECT_TRUE(near == array_.data);
+}
+
+// Base materials, a part in another file of the archive, and a Collada file with another upright axis.
+TEST_F(ObjCases, OtherFormats) {
+    if (!VOXELPIPE_TOOL_HAS_ASSIMP) GTEST_SKIP() << "no assimp";
+    EXPECT_EQ(208U, voxels_of(shared_cases() / "f17_path.3mf"));
+    EXPECT_EQ("", outcome_.err);
+    (void)voxels_of(shared_cases() / "f26_zup.dae", "-s 1 -t occupancy");
+    EXPECT_EQ("voxelize: warning: the file states Z as upright: it is turned to Y, so x, y, z become x, z, -y\n",
+              outcome_.err);
+    EXPECT_EQ((std::vector<std::size_t>{2, 1, 3}), array_.shape);
 }
 
 TEST_F(ObjCases, AListMayHaveAByteOrderMark) {

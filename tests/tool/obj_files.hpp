@@ -6,8 +6,8 @@
 #include "gltf_builder.hpp"
 #include "tool_runner.hpp"
 
-#include <model_file.hpp>
-#include <triangle_stream.hpp>
+#include <read/model_file.hpp>
+#include <read/triangle_stream.hpp>
 
 #include <gtest/gtest.h>
 

@@ -6,11 +6,10 @@
 usage: obj_sweep.py VOXELIZE [--every N]
 
 trimesh reads each mesh in its plainest layout and writes it as a binary STL; the voxels of every layout have to be those
-of that STL. --every N takes each N-th layout (VOXELPIPE_SWEEP_EVERY, 20 by default). Ends with 1 at a difference.
+of that STL. --every N takes one layout of N (1 by default). Ends with 1 at a difference.
 """
 import argparse
 import itertools
-import os
 import pathlib
 import random
 import subprocess
@@ -95,7 +94,7 @@ def text_of(vertices, faces, number, corner, extra, order):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("voxelize", type=pathlib.Path)
-    parser.add_argument("--every", type=int, default=int(os.environ.get("VOXELPIPE_SWEEP_EVERY", "20")))
+    parser.add_argument("--every", type=int, default=1)
     options = parser.parse_args()
     number_of_files, wrong = 0, 0
     with tempfile.TemporaryDirectory() as name:

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // Pictures are kept at the resolution that the voxels need, and the voxels have the colours of the whole pictures.
-#include <mip_levels.hpp>
-#include <picture_levels.hpp>
+#include <draw/mip_levels.hpp>
+#include <draw/picture_levels.hpp>
 
 #include <gtest/gtest.h>
 

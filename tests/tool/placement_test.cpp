@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Boxes on lattices: the grid holds what it has to and no more, thin shells are closed, nothing is drawn in the
 // padding.
-#include <padding.hpp>
-#include <placement.hpp>
-#include <targets.hpp>
-#include <voxelizer.hpp>
+#include <draw/padding.hpp>
+#include <draw/voxelizer.hpp>
+#include <model/placement.hpp>
+#include <model/targets.hpp>
 
 #include <gtest/gtest.h>
 

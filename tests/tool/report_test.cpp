@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // The progress bar: drawn on terminals only, and only for work that takes a while.
-#include <memory.hpp>
-#include <report.hpp>
+#include <model/memory.hpp>
+#include <run/report.hpp>
 
 #include <gtest/gtest.h>
 

@@ -3,8 +3,8 @@
 // A streamed model gives the warnings and counts of a loaded one, in the same order.
 #include "tool_test.hpp"
 
-#include <model_file.hpp>
-#include <triangle_stream.hpp>
+#include <read/model_file.hpp>
+#include <read/triangle_stream.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // The tool's shading, piece by piece: sRGB tables, texture sampling, the nearest point of a triangle.
-#include <surface.hpp>
+#include <draw/surface.hpp>
 
 #include <gtest/gtest.h>
 

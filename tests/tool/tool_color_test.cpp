@@ -3,7 +3,7 @@
 // Colours of voxels: textures finer than voxels, alpha, walls with two sides. The program, end to end.
 #include "tool_test.hpp"
 
-#include <outside.hpp>
+#include <draw/outside.hpp>
 
 #include <gtest/gtest.h>
 

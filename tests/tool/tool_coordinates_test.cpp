@@ -4,7 +4,7 @@
 // has not are a warning.
 #include "tool_test.hpp"
 
-#include <placement.hpp>
+#include <model/placement.hpp>
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 // named suffices; those that claim what they do not hold end with 2, soon and in little address space.
 #include "two_ways.hpp"
 
-#include <memory.hpp>
+#include <model/memory.hpp>
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 // the system gives for the process.
 #include "tool_test.hpp"
 
-#include <formats/formats.hpp>
+#include <write/formats/formats.hpp>
 
 #include <gtest/gtest.h>
 

@@ -3,8 +3,8 @@
 // The options of the voxelize program: the help names them all, and those of pictures and files do what it says.
 #include "tool_test.hpp"
 
-#include <formats/formats.hpp>
-#include <targets.hpp>
+#include <model/targets.hpp>
+#include <write/formats/formats.hpp>
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 // share it, and a run that goes on does not repeat it. The files are those of a run which does it at once.
 #include "tower.hpp"
 
-#include <pass_files.hpp>
+#include <draw/pass_files.hpp>
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include "tool_test.hpp"
 
 #include <cpu_ref/backend.hpp>
-#include <surface.hpp>
-#include <voxelizer.hpp>
+#include <draw/surface.hpp>
+#include <draw/voxelizer.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <gtest/gtest.h>

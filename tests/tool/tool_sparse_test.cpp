@@ -4,7 +4,7 @@
 // runs, the same pictures, the same files each time.
 #include "tool_test.hpp"
 
-#include <targets.hpp>
+#include <model/targets.hpp>
 
 #include <gtest/gtest.h>
 

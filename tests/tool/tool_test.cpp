@@ -4,8 +4,8 @@
 // come to: tool_materials_test.cpp.
 #include "tool_test.hpp"
 
-#include <formats/formats.hpp>
-#include <targets.hpp>
+#include <model/targets.hpp>
+#include <write/formats/formats.hpp>
 
 #include <gtest/gtest.h>
 

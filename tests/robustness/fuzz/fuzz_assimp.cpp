@@ -4,8 +4,8 @@
 // rest is what the process that runs assimp sends back, as a hostile file may make it. Whatever the bytes are, a valid
 // scene or a model_error of one printable line comes out; anything else is a finding. Compiled with
 // VOXELPIPE_FUZZ_REPLAY it is a plain program that runs the files and folders it is given.
-#include <assimp/wire.hpp>
-#include <assimp_scene.hpp>
+#include <read/assimp/wire.hpp>
+#include <read/assimp_scene.hpp>
 
 #include <cstdint>
 #include <cstdio>

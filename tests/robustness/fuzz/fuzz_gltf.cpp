@@ -3,7 +3,7 @@
 // libFuzzer target for the glTF loader, from memory. For any bytes, the loader returns a valid scene or throws
 // gltf_error with one printable line. Anything else (crash, sanitizer report, other exception, time, memory) is a
 // finding. Compiled with VOXELPIPE_FUZZ_REPLAY, it is a plain program that runs the given files and folders.
-#include <gltf_scene.hpp>
+#include <read/gltf_scene.hpp>
 
 #include <cstdint>
 #include <cstdio>

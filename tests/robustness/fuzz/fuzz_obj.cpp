@@ -89,8 +89,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         refusal = printable(error);
     }
     try {
-        const voxelize::opened_stream opened = voxelize::stream_of(voxelize::open_obj(model, options), model,
-                                                                   {1 << 20, 0}, folder(), limits, options);
+        const voxelize::opened_stream opened =
+            voxelize::stream_of(voxelize::open_obj(model, options), model, {1 << 20, 0}, folder(), limits, options);
         if (!opened.stream) return 0; // it has lines or points
         require(refusal.empty(), "streamed, and not loaded");
         require(opened.stream->num_triangles() == triangles, "another number of triangles in the stream");

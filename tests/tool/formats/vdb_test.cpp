@@ -5,9 +5,9 @@
 
 #include "test_volumes.hpp"
 
-#include <formats/formats.hpp>
-#include <sparse/sparse_formats.hpp>
-#include <srgb.hpp>
+#include <model/srgb.hpp>
+#include <write/formats/formats.hpp>
+#include <write/sparse_formats.hpp>
 
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>

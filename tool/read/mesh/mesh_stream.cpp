@@ -32,7 +32,7 @@ struct refusal : model_error {
 };
 
 template <class T>
-std::span<const std::byte> bytes_of(const T& value) {
+std::span<const std::byte> as_stored(const T& value) {
     return std::as_bytes(std::span(&value, 1));
 }
 
@@ -76,7 +76,7 @@ private:
     void vertex(const mesh_vertex& v) override;
     void texcoord(const glm::vec2& value) override {
         if (!list_) list_.emplace(folder_);
-        list_->append(bytes_of(value));
+        list_->append(as_stored(value));
         ++num_texcoords_;
     }
     void face(const mesh_face& f) override;
@@ -146,12 +146,12 @@ void mesh_stream::vertex(const mesh_vertex& v) {
     if (in_place_) return;
     if (!vertices_) vertices_.emplace(folder_);
     if (reader_->description().is_double) {
-        vertices_->append(bytes_of(v.position));
+        vertices_->append(as_stored(v.position));
     } else {
-        vertices_->append(bytes_of(glm::vec3(v.position)));
+        vertices_->append(as_stored(glm::vec3(v.position)));
     }
-    if (has_vertex_colors_) vertices_->append(bytes_of(v.color));
-    if (has_vertex_texcoords_) vertices_->append(bytes_of(v.texcoord));
+    if (has_vertex_colors_) vertices_->append(as_stored(v.color));
+    if (has_vertex_texcoords_) vertices_->append(as_stored(v.texcoord));
 }
 
 void mesh_stream::read_vertices() {
@@ -286,9 +286,9 @@ void mesh_stream::triangle(const mesh_face& f, const mesh_corner& a, const mesh_
     if (runs_.empty() || runs_.back().part != f.part) runs_.push_back({num_copied_, 0, f.part});
     ++runs_.back().count;
     ++num_copied_;
-    triangles_->append(bytes_of(glm::uvec3(a.vertex, b.vertex, c.vertex)));
-    if (has_corner_texcoords_) triangles_->append(bytes_of(glm::uvec3(a.texcoord, b.texcoord, c.texcoord)));
-    if (has_face_colors_) triangles_->append(bytes_of(f.color.value_or(no_face_color)));
+    triangles_->append(as_stored(glm::uvec3(a.vertex, b.vertex, c.vertex)));
+    if (has_corner_texcoords_) triangles_->append(as_stored(glm::uvec3(a.texcoord, b.texcoord, c.texcoord)));
+    if (has_face_colors_) triangles_->append(as_stored(f.color.value_or(no_face_color)));
 }
 
 void mesh_stream::finish(std::uint64_t room) {
