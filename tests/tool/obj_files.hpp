@@ -63,7 +63,9 @@ public:
         voxelize::opened_stream opened;
         const std::string streamed = message_of([&] { opened = stream(options); });
         // A file without a face is no stream: it is loaded then.
-        if (!streamed.empty() || opened.stream) EXPECT_EQ(loaded, streamed);
+        if (!streamed.empty() || opened.stream) {
+            EXPECT_EQ(loaded, streamed);
+        }
         for (const char c : loaded) EXPECT_TRUE(c >= ' ' && c <= '~') << loaded;
         return loaded;
     }

@@ -199,6 +199,83 @@ TEST(ObjMaterials, APictureOfAlphaAloneCounts) {
               joined(scene.warnings));
 }
 
+// The header of a TGA.
+std::string tga(int type, int width, int height, int bits, int descriptor, const std::string& pixels) {
+    std::string bytes(18, '\0');
+    bytes[2] = static_cast<char>(type);
+    bytes[12] = static_cast<char>(width & 0xFF);
+    bytes[13] = static_cast<char>(width >> 8);
+    bytes[14] = static_cast<char>(height & 0xFF);
+    bytes[15] = static_cast<char>(height >> 8);
+    bytes[16] = static_cast<char>(bits);
+    bytes[17] = static_cast<char>(descriptor);
+    return bytes + pixels;
+}
+
+// A BMP with the header of 40 bytes.
+std::string bmp(int width, int height, int bits, int compression, const std::string& pixels) {
+    std::string bytes("BM");
+    const auto put = [&bytes](int value, int count) {
+        for (int i = 0; i < count; ++i) bytes += static_cast<char>(static_cast<unsigned>(value) >> (8 * i) & 0xFFU);
+    };
+    put(54 + static_cast<int>(pixels.size()), 4);
+    put(0, 4);
+    put(54, 4);
+    put(40, 4);
+    put(width, 4);
+    put(height, 4);
+    put(1, 2);
+    put(bits, 2);
+    put(compression, 4);
+    put(static_cast<int>(pixels.size()), 4);
+    for (int i = 0; i < 4; ++i) put(0, 4);
+    return bytes + pixels;
+}
+
+TEST(ObjMaterials, TgaAndBmpAreRead) {
+    const auto texels = [](const std::string& picture) {
+        const voxelize::scene scene = painted("map_Kd a.pic", {{"a.pic", picture}}).load();
+        EXPECT_EQ("", joined(scene.warnings));
+        return scene.images.size() == 1 ? picture_of(scene).rgba : std::vector<std::uint8_t>();
+    };
+    using rgba = std::vector<std::uint8_t>;
+    const rgba two{3, 2, 1, 255, 6, 5, 4, 255};
+    EXPECT_EQ(two, texels(tga(2, 2, 1, 24, 0, "\1\2\3\4\5\6")));
+    EXPECT_EQ(two, texels(tga(10, 2, 1, 24, 0, "\1\1\2\3\4\5\6"))) << "packed";
+    EXPECT_EQ((rgba{3, 2, 1, 255, 3, 2, 1, 255}), texels(tga(10, 2, 1, 24, 0, "\x81\1\2\3"))) << "a run";
+    EXPECT_EQ((rgba{3, 2, 1, 9}), texels(tga(2, 1, 1, 32, 8, "\1\2\3\x9")));
+    EXPECT_EQ((rgba{3, 2, 1, 255}), texels(tga(2, 1, 1, 32, 0, "\1\2\3\x9"))) << "it says that it has no alpha";
+    EXPECT_EQ((rgba{7, 7, 7, 255}), texels(tga(3, 1, 1, 8, 0, "\7"))) << "grey";
+    EXPECT_EQ((rgba{1, 1, 1, 255, 2, 2, 2, 255}), texels(tga(3, 1, 2, 8, 0, "\2\1"))) << "the lowest row first";
+    EXPECT_EQ((rgba{2, 2, 2, 255, 1, 1, 1, 255}), texels(tga(3, 1, 2, 8, 0x20, "\2\1"))) << "the top row first";
+    EXPECT_EQ(two, texels(bmp(2, 1, 24, 0, std::string("\1\2\3\4\5\6\0\0", 8))));
+    EXPECT_EQ((rgba{3, 2, 1, 9}), texels(bmp(1, 1, 32, 0, "\1\2\3\x9")));
+    EXPECT_EQ((rgba{3, 2, 1, 255, 6, 5, 4, 255}), texels(bmp(1, -2, 24, 0, std::string("\1\2\3\0\4\5\6\0", 8))))
+        << "the top row first";
+}
+
+TEST(ObjMaterials, TgaAndBmpThatCannotBeAreRefused) {
+    const auto reason = [](const std::string& picture) {
+        const std::string all = joined(painted("map_Kd a.pic", {{"a.pic", picture}}).load().warnings);
+        const std::string before = "the texture \"a.pic\" cannot be used: ",
+                          behind = "; the material's colour is used alone\n";
+        EXPECT_TRUE(all.starts_with(before) && all.ends_with(behind)) << all;
+        return all.substr(before.size(), all.size() - before.size() - behind.size());
+    };
+    EXPECT_EQ("the TGA is cut short: its 2 x 1 pixels cannot come from 23 bytes", reason(tga(2, 2, 1, 24, 0, "12345")));
+    EXPECT_EQ("the TGA is cut short: its 16000 x 16000 pixels cannot come from 22 bytes",
+              reason(tga(10, 16000, 16000, 24, 0, "\xFF\1\2\3")));
+    EXPECT_EQ("its 20000 x 1 pixels are too large: at most 16384 a side are read",
+              reason(tga(2, 20000, 1, 24, 0, "1")));
+    EXPECT_EQ("the BMP is cut short: its 2 x 1 pixels cannot come from 58 bytes", reason(bmp(2, 1, 24, 0, "1234")));
+    EXPECT_EQ("it is a compressed BMP, and only those without compression are supported",
+              reason(bmp(2, 1, 8, 1, "1234")));
+    EXPECT_EQ("its 20000 x 1 pixels are too large: at most 16384 a side are read", reason(bmp(20000, 1, 24, 0, "1")));
+    EXPECT_EQ("the BMP is cut short within its header", reason("BM and so on"));
+    EXPECT_EQ("it is KTX2, which is not supported (PNG, JPEG, WebP, TGA and BMP are)",
+              reason(std::string("\xABKTX 20\xBB\r\n\x1A\n and more of it")));
+}
+
 // A square of two materials, A and B, behind LIBRARIES.
 std::string two_materials(const std::string& libraries) {
     return libraries + "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n";
