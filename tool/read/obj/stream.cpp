@@ -27,7 +27,7 @@ opened_stream open_obj_stream(const std::filesystem::path& path, const stream_ro
                               const std::filesystem::path& folder, const gltf_limits& limits,
                               const gltf_options& options) {
     // A triangle takes eight bytes of text at least, and a vertex too. What fits so is not counted.
-    constexpr double likely = 156, least = 96, most_by_byte = 20;
+    constexpr double likely = 190, least = 120, most_by_byte = 24;
     std::error_code error;
     if (options.animation || !std::filesystem::is_regular_file(path, error)) return {};
     const auto bytes = static_cast<double>(std::filesystem::file_size(path, error));
