@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// STL, PLY, OFF and what else assimp reads, but for OBJ, -> scene. The import runs in a process of its own, with bounds
-// on time and memory that grow with the file: a malformed or hostile file gives a model_error of one line.
+// What assimp reads, but for formats with readers of their own (mesh/) -> scene. The import runs in a
+// process of its own, with bounds on time and memory that grow with the file: a malformed or hostile file gives a
+// model_error of one line.
 //
 // Positions are in the file's own units and axes: nothing is rescaled or turned, but where a format states its unit or
 // upright axis and assimp follows that (Collada), which is a warning. Colours of materials and vertices are taken as

@@ -101,6 +101,16 @@ TEST(PlyReader, CommentsAndInfoMayStandAnywhereInTheHeader) {
                                               cube_vertices() + cube_polygons())));
 }
 
+// A comment without its word; the property of faces that are not there behind those of the vertices.
+TEST(PlyReader, HeadersOfBlenderAreRead) {
+    const folder files;
+    std::string text = cube() + cube_vertices() + cube_polygons();
+    text.insert(text.find("element"), "Created by Blender3D 247 - www.blender.org, source file: \n");
+    expect_cube(read(files.write("a.ply", text)));
+    EXPECT_EQ(
+        8U, read(files.write("b.ply", text_header("element vertex 8\n" + xyz + list) + cube_vertices())).lines.size());
+}
+
 TEST(PlyReader, StripsAreCutAtMinusOne) {
     const folder files;
     const std::string strips = "29 0 2 1 3 -1 4 5 6 7 -1 0 1 4 5 -1 2 6 3 7 -1 0 4 2 6 -1 1 3 5 7\n";

@@ -5,6 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cctype>
+#include <map>
+
 using namespace mesh_files;
 
 namespace {
@@ -302,6 +305,26 @@ TEST(MeshReaders, GivenFilesAreRight) {
     EXPECT_EQ("the header promises 6 faces, and the file has 3 (it ends in line 21)",
               error_of(file("f07_truncated.ply")));
     EXPECT_EQ(loaded(file("f02_control_points.ply")).lines.size(), loaded(file("f02_newline_points.ply")).lines.size());
+}
+
+// The models of Debian's package assimp-testmodels, where it is installed: each loads, or is refused in one line.
+TEST(MeshReaders, TestModelsLoadOrSayWhyNot) {
+    const fs::path folder = "/usr/share/assimp/models";
+    if (!fs::is_directory(folder)) GTEST_SKIP() << "no " << folder;
+    std::map<std::string, std::size_t> triangles;
+    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+        std::string extension = entry.path().extension().string();
+        std::transform(extension.begin(), extension.end(), extension.begin(),
+                       [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+        if (extension != ".stl" && extension != ".ply" && extension != ".off") continue;
+        const std::string name = entry.path().lexically_relative(folder).generic_string();
+        const std::string error = error_of(entry.path());
+        if (error == "no error") triangles[name] = loaded(entry.path()).triangles.size();
+    }
+    for (const char* same : {"OFF/Wuson.off", "PLY/Wuson.ply", "STL/Wuson.stl"})
+        EXPECT_EQ(triangles.at("OFF/Wuson.off"), triangles.at(same)) << same;
+    for (const char* cube : {"OFF/Cube.off", "PLY/cube.ply", "PLY/cube_binary.ply"})
+        EXPECT_EQ(12U, triangles.at(cube)) << cube;
 }
 
 } // namespace

@@ -27,14 +27,6 @@ namespace voxelize::assimp {
 
 namespace {
 
-// Faults that assimp finds too late.
-void check_text(std::span<const std::byte> bytes, const std::string& extension) {
-    const std::string_view text{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-    // Looked for without end otherwise.
-    if (extension == ".ply" && text.find("end_header") == std::string_view::npos)
-        throw std::runtime_error("the PLY header has no end_header");
-}
-
 // ---- Materials
 // -------------------------------------------------------------------------------------------------------
 
@@ -226,7 +218,6 @@ bool reads(const std::string& extension) { return Assimp::Importer{}.IsExtension
 
 model read_model(std::span<const std::byte> bytes, const std::string& name, const gltf_file_reader& read_file) {
     const std::string extension = lower_extension(name);
-    check_text(bytes, extension);
     if (extension == ".3mf")
         if (std::optional<model> package = read_package_3mf(bytes)) return std::move(*package);
     Assimp::Importer importer;

@@ -58,6 +58,7 @@ public:
                 // The first byte of the data may be an LF.
                 if (ends_by_cr_alone && file_.ended_by_cr_lf() && found_.format != ply_header::encoding::text)
                     --found_.data;
+                drop_stray_lists();
                 return std::move(found_);
             }
             if (key == "format")
@@ -68,9 +69,7 @@ public:
                 read_property(line);
             else if (key == "comment")
                 read_comment(line);
-            else if (key != "obj_info" && !key.empty())
-                fail(gltf::in_quotes(key) + " is found where format, element, property, comment, obj_info or "
-                                            "end_header was expected");
+            // All else is obj_info, or a comment whose word is missing, as Blender 2.4 wrote it.
         }
         throw model_error("the PLY header has no end_header");
     }
@@ -119,6 +118,15 @@ private:
         made.name = take_word(line);
         if (made.name.empty()) fail("a property has no name");
         found_.elements.back().properties.push_back(std::move(made));
+    }
+    // Blender 2.7 wrote the property of the faces behind those of the vertices where a mesh has none.
+    void drop_stray_lists() {
+        const auto is_of_faces = [](const ply_element& e) { return e.name == "face" || e.name == "tristrips"; };
+        if (std::any_of(found_.elements.begin(), found_.elements.end(), is_of_faces)) return;
+        for (ply_element& e : found_.elements)
+            if (e.name == "vertex" && !e.properties.empty() && e.properties.back().length &&
+                e.properties.back().name == "vertex_indices")
+                e.properties.pop_back();
     }
     void read_comment(std::string_view line) {
         const std::string_view key = take_word(line);
