@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// OBJ/MTL, STL, PLY and OFF, small files written by the test; and files that are wrong.
+// Files that are wrong, read by assimp in a process of its own.
 #include "gltf_builder.hpp"
 
 #include <read/assimp_scene.hpp>
@@ -49,314 +49,7 @@ std::string error_of(const std::string& name, const std::vector<std::byte>& byte
     return "no error";
 }
 
-std::string text_of(const std::vector<std::string>& lines) {
-    std::string text;
-    for (const std::string& line : lines) text += line + '\n';
-    return text;
-}
-
-// Twice the area of all triangles in the world.
-double area_of(const scene& scene) {
-    double sum = 0;
-    for (const voxelize::instance& shown : scene.instances) {
-        const voxelize::primitive& part = scene.primitives.at(shown.primitive);
-        for (const glm::uvec3& t : part.triangles) {
-            const glm::dvec3 a = shown.to_world(part.positions.at(t.x));
-            sum += glm::length(
-                glm::cross(shown.to_world(part.positions.at(t.y)) - a, shown.to_world(part.positions.at(t.z)) - a));
-        }
-    }
-    return sum / 2;
-}
-
-struct box {
-    glm::dvec3 low{1e300};
-    glm::dvec3 high{-1e300};
-};
-
-box bounds_of(const scene& scene) {
-    box result;
-    for (const voxelize::instance& shown : scene.instances)
-        for (const glm::vec3& p : scene.primitives.at(shown.primitive).positions) {
-            result.low = glm::min(result.low, shown.to_world(p));
-            result.high = glm::max(result.high, shown.to_world(p));
-        }
-    return result;
-}
-
-// sRGB bytes that a linear colour shows as.
-glm::ivec3 shown_as(const glm::vec3& linear) {
-    glm::ivec3 bytes;
-    for (int i = 0; i < 3; ++i) {
-        const double c = linear[i];
-        bytes[i] =
-            static_cast<int>(std::lround(255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1 / 2.4) - 0.055)));
-    }
-    return bytes;
-}
-
-// A square of side 2 in z = 5 that faces +z, with texture coordinates and a material.
-constexpr const char* square_obj = "mtllib square.mtl\n"
-                                   "v 0 0 5\nv 2 0 5\nv 2 2 5\nv 0 2 5\n"
-                                   "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
-                                   "usemtl paint\nf 1/1 2/2 3/3 4/4\n";
-
-TEST(Obj, PolygonsBecomeTrianglesInTheFilesUnits) {
-    const scene scene = load("square.obj", square_obj);
-    EXPECT_EQ(2U, scene.triangle_count());
-    EXPECT_DOUBLE_EQ(4, area_of(scene));
-    EXPECT_EQ(glm::dvec3(0, 0, 5), bounds_of(scene).low);
-    EXPECT_EQ(glm::dvec3(2, 2, 5), bounds_of(scene).high);
-    const voxelize::primitive& part = scene.primitives.at(0);
-    for (const glm::uvec3& t : part.triangles) {
-        const auto& p = part.positions;
-        EXPECT_LT(0, glm::cross(p[t.y] - p[t.x], p[t.z] - p[t.x]).z); // the winding stays
-    }
-}
-
-TEST(Obj, ConcavePolygonsKeepTheirShape) {
-    // An L of area 3: as a fan around its first corner it would cover more.
-    const scene scene = load("l.obj", "v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\nf 1 2 3 4 5 6\n");
-    EXPECT_EQ(4U, scene.triangle_count());
-    EXPECT_NEAR(3, area_of(scene), 1e-6);
-}
-
-TEST(Obj, MaterialsShowTheColoursThatTheFileSays) {
-    const files others{{"square.mtl", bytes_of("newmtl other\nKd 1 0 0\nnewmtl paint\nKd 0.5 0.25 0.75\nd 0.5\n")}};
-    const scene scene = load("square.obj", square_obj, others);
-    EXPECT_EQ("", text_of(scene.warnings));
-    const voxelize::material& paint = scene.materials.at(scene.primitives.at(0).material);
-    EXPECT_EQ("paint", paint.name);
-    EXPECT_EQ(glm::ivec3(128, 64, 191), shown_as(paint.base_color));
-    EXPECT_EQ(0.5F, paint.base_color.a);
-    EXPECT_EQ(voxelize::alpha_mode::blend, paint.alpha);
-    EXPECT_EQ(voxelize::material::no_texture, paint.texture);
-    EXPECT_TRUE(scene.primitives[0].texcoords.empty());
-}
-
-TEST(Obj, WithoutItsMaterialsASurfaceIsWhite) {
-    const scene scene = load("square.obj", square_obj);
-    EXPECT_EQ(glm::vec4(1), scene.materials.at(scene.primitives.at(0).material).base_color);
-    EXPECT_EQ("the material library \"square.mtl\" cannot be read: surfaces are white\n", text_of(scene.warnings));
-}
-
-// The colour at the top left of the square, of a picture whose top row is red, green.
-TEST(Obj, TexturesStandUpright) {
-    const std::vector<std::uint8_t> pixels{255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255, 9, 9, 9, 255};
-    const std::vector<std::byte> picture = gltf_test::png(2, 2, pixels);
-    for (const char* name : {"maps/wood.png", "maps\\wood.png", ".\\maps\\wood.png"}) {
-        const files others{{"square.mtl", bytes_of("newmtl paint\nKd 1 1 1\nmap_Kd " + std::string(name) + "\n")},
-                           {"maps/wood.png", picture}};
-        const scene scene = load("square.obj", square_obj, others);
-        ASSERT_EQ("", text_of(scene.warnings)) << name;
-        const voxelize::primitive& part = scene.primitives.at(0);
-        const voxelize::material& paint = scene.materials.at(part.material);
-        ASSERT_EQ(0, paint.texture);
-        EXPECT_EQ(pixels, scene.images.at(scene.textures.at(0).image).rgba);
-        EXPECT_EQ(voxelize::wrap_mode::repeat, scene.textures[0].wrap_s);
-        ASSERT_EQ(part.positions.size(), part.texcoords.size());
-        for (std::size_t i = 0; i < part.positions.size(); ++i) // v runs down: (0, 0) is the top left, at (0, 2)
-            EXPECT_EQ(glm::vec2(part.positions[i].x / 2, 1 - part.positions[i].y / 2), part.texcoords[i]);
-    }
-}
-
-TEST(Obj, ATextureIsFoundBesideTheModelWhateverItsPath) {
-    const std::vector<std::byte> picture = gltf_test::png(1, 1, {1, 2, 3, 255});
-    for (const char* name : {"C:\\work\\wood.png", "/home/me/wood.png", "../maps/wood.png", "maps/wood.png"}) {
-        const files others{{"square.mtl", bytes_of("newmtl paint\nKd 0 0 0\nmap_Kd " + std::string(name) + "\n")},
-                           {"wood.png", picture}};
-        const scene scene = load("square.obj", square_obj, others);
-        EXPECT_EQ("", text_of(scene.warnings)) << name;
-        EXPECT_EQ(1U, scene.images.size()) << name;
-        // Black beside a texture is what exporters leave there.
-        EXPECT_EQ(glm::vec4(1), scene.materials.at(scene.primitives.at(0).material).base_color);
-    }
-}
-
-TEST(Obj, ATextureThatCannotBeHadIsAWarning) {
-    const auto with = [](const files& more) {
-        files others{{"square.mtl", bytes_of("newmtl paint\nKd 0.5 0.5 0.5\nmap_Kd wood.tga\n")}};
-        others.insert(more.begin(), more.end());
-        const scene scene = load("square.obj", square_obj, others);
-        EXPECT_EQ(2U, scene.triangle_count());
-        EXPECT_TRUE(scene.primitives.at(0).texcoords.empty());
-        return text_of(scene.warnings);
-    };
-    EXPECT_EQ("the texture \"wood.tga\" cannot be used: no such file; the material's colour is used alone\n", with({}));
-    EXPECT_EQ(
-        "the texture \"wood.tga\" cannot be used: it is neither PNG, JPEG nor WebP; the material's colour is used "
-        "alone\n",
-        with({{"wood.tga", bytes_of("\x01\x02")}}));
-}
-
-// A square of two materials, A and B, behind LIBRARIES.
-std::string two_materials(const std::string& libraries) {
-    return libraries + "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n";
-}
-
-glm::vec4 color_of(const scene& scene, const std::string& name) {
-    for (const voxelize::material& entry : scene.materials)
-        if (entry.name == name) return entry.base_color;
-    ADD_FAILURE() << "no material " << name;
-    return {};
-}
-
-TEST(Obj, SeveralLibrariesAreRead) {
-    const glm::vec4 red(1, 0, 0, 1), green(0, 1, 0, 1);
-    const files others{{"red.mtl", bytes_of("newmtl a\nKd 1 0 0")},
-                       {"my greens.MTL", bytes_of("newmtl b\nKd 0 1 0\n")},
-                       {"plain", bytes_of("newmtl b\nKd 0 1 0\n")}};
-    for (const char* const libraries : {"mtllib red.mtl my greens.MTL\n", "mtllib my greens.MTL  red.mtl\r\n",
-                                        "mtllib red.mtl\nmtllib my greens.MTL\n", "mtllib red.mtl\nmtllib plain\n"}) {
-        const scene scene = load("m.obj", two_materials(libraries), others);
-        EXPECT_EQ("", text_of(scene.warnings)) << libraries;
-        EXPECT_EQ(red, color_of(scene, "a")) << libraries;
-        EXPECT_EQ(green, color_of(scene, "b")) << libraries;
-    }
-}
-
-TEST(Obj, AMessageNamesTheLibraryThatCannotBeRead) {
-    const auto warnings = [](const std::string& libraries, const files& others) {
-        return text_of(load("m.obj", two_materials(libraries), others).warnings);
-    };
-    const std::vector<std::byte> a = bytes_of("newmtl a\nKd 1 0 0\n");
-    const std::string start = "the material library ";
-    EXPECT_EQ(start + "\"gone.mtl\" cannot be read: surfaces of its materials are white\n",
-              warnings("mtllib red.mtl gone.mtl\n", {{"red.mtl", a}}));
-    EXPECT_EQ(start + "\"gone.mtl\" cannot be read: surfaces of its materials are white\n",
-              warnings("mtllib gone.mtl\nmtllib red.mtl\n", {{"red.mtl", a}}));
-    EXPECT_EQ(start + "\"one.mtl\" cannot be read: surfaces are white\n" + start +
-                  "\"two.mtl\" cannot be read: surfaces are white\n",
-              warnings("mtllib one.mtl two.mtl\n", {}));
-    EXPECT_EQ(start + "\"m.mtl\" cannot be read: surfaces are white\n", warnings("mtllib m.mtl\n", {}));
-    // assimp's choice where nothing that is named is there.
-    EXPECT_EQ(start + "\"gone.mtl\" cannot be read: \"m.mtl\" is read in its place\n",
-              warnings("mtllib gone.mtl\n", {{"m.mtl", a}}));
-    const scene scene = load("m.obj", two_materials("mtllib red.mtl gone.mtl\n"), {{"red.mtl", a}});
-    EXPECT_EQ(glm::vec4(1, 0, 0, 1), color_of(scene, "a"));
-    EXPECT_EQ(glm::vec4(1), color_of(scene, "b"));
-}
-
-TEST(Obj, FilesOutsideTheFolderAreNotRead) {
-    std::vector<std::string> asked;
-    const auto reader = [&](const std::filesystem::path& path, std::uint64_t) -> std::vector<std::byte> {
-        EXPECT_TRUE(path.is_relative()) << path;
-        EXPECT_NE("..", path.begin()->string()) << path;
-        throw voxelize::gltf_error("no such file");
-    };
-    for (const char* library : {"../../secret.mtl", "/etc/passwd", "C:\\secret.mtl", "a/../../../b.mtl"}) {
-        const std::string text = "mtllib " + std::string(library) + "\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-        EXPECT_EQ(1U, voxelize::load_by_assimp(bytes_of(text), "m.obj", reader).triangle_count());
-    }
-}
-
-TEST(Obj, Utf16IsNamed) {
-    std::vector<std::byte> bytes{std::byte{0xFE}, std::byte{0xFF}};
-    for (const char c : std::string_view("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"))
-        bytes.insert(bytes.end(), {std::byte{0}, static_cast<std::byte>(c)});
-    EXPECT_EQ("assimp: the file is text in UTF-16, not UTF-8", error_of("wide.obj", bytes));
-}
-
-// assimp by itself drops it in files of more than 16 MiB, which it reads in blocks.
-TEST(Obj, TheLastLineNeedsNoEnd) {
-    const std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", last = "f 3 2 1";
-    std::string comments;
-    for (int i = 0; i < 17; ++i) comments += "# " + std::string((1 << 20) - 3, ' ') + '\n';
-    EXPECT_EQ(2U, load("short.obj", text + last).triangle_count());
-    EXPECT_EQ(2U, load("long.obj", text + comments + last).triangle_count());
-    EXPECT_EQ(2U, load("long.obj", text + comments + last + '\n').triangle_count());
-}
-
-TEST(Obj, LinesAndPointsComeBesideTriangles) {
-    const scene scene = load("mixed.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2\nl 2 3\nf 1 2 3\np 2\n");
-    EXPECT_EQ(1U, scene.triangle_count());
-    EXPECT_EQ(3U, scene.line_count());
-    EXPECT_EQ("", text_of(scene.warnings));
-    for (const voxelize::primitive& part : scene.primitives) EXPECT_TRUE(part.triangles.empty() || part.lines.empty());
-}
-
-TEST(Ply, VerticesWithoutFacesArePoints) {
-    const scene scene =
-        load("cloud.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
-                          "property float z\nproperty uchar red\nproperty uchar green\n"
-                          "property uchar blue\nend_header\n0 0 0 255 0 0\n1 2 3 0 255 0\n4 5 6 0 0 255\n");
-    EXPECT_EQ(0U, scene.triangle_count());
-    EXPECT_EQ(3U, scene.line_count());
-    ASSERT_EQ(1U, scene.primitives.size());
-    EXPECT_EQ((std::vector<glm::uvec2>{{0, 0}, {1, 1}, {2, 2}}), scene.primitives[0].lines);
-    ASSERT_EQ(3U, scene.primitives[0].colors.size());
-    EXPECT_EQ(glm::vec4(0, 1, 0, 1), scene.primitives[0].colors[1]);
-}
-
-constexpr const char* triangle_stl = "solid one\nfacet normal 0 0 1\nouter loop\nvertex 0 0 7\nvertex 3 0 7\n"
-                                     "vertex 0 4 7\nendloop\nendfacet\nendsolid one\n";
-
-std::vector<std::byte> binary_stl(std::uint32_t count_says) {
-    std::vector<std::byte> bytes(84 + 50);
-    std::memcpy(bytes.data() + 80, &count_says, 4);
-    const float corners[] = {0, 0, 1, 0, 0, 7, 3, 0, 7, 0, 4, 7};
-    std::memcpy(bytes.data() + 84, corners, sizeof(corners));
-    return bytes;
-}
-
-TEST(Stl, TextAndBinaryAreTheSameWhiteTriangle) {
-    for (const scene& scene : {load("one.stl", triangle_stl), load("ONE.STL", binary_stl(1))}) {
-        EXPECT_EQ(1U, scene.triangle_count());
-        EXPECT_DOUBLE_EQ(6, area_of(scene));
-        EXPECT_EQ(glm::dvec3(3, 4, 7), bounds_of(scene).high);
-        EXPECT_EQ(glm::vec4(1), scene.materials.at(scene.primitives.at(0).material).base_color);
-    }
-}
-
-TEST(Ply, VertexColoursAreShownAsTheyAre) {
-    const scene scene =
-        load("c.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
-                      "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
-                      "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
-                      "0 0 0 128 0 255\n1 0 0 64 200 1\n0 1 0 0 17 33\n3 0 1 2\n");
-    ASSERT_EQ(1U, scene.triangle_count());
-    const voxelize::primitive& part = scene.primitives.at(0);
-    EXPECT_EQ(glm::vec4(1), scene.materials.at(part.material).base_color);
-    ASSERT_EQ(3U, part.colors.size());
-    for (std::size_t i = 0; i < 3; ++i) {
-        const glm::ivec3 expected = part.positions[i].x == 1   ? glm::ivec3(64, 200, 1)
-                                    : part.positions[i].y == 1 ? glm::ivec3(0, 17, 33)
-                                                               : glm::ivec3(128, 0, 255);
-        EXPECT_EQ(expected, shown_as(part.colors[i])) << i;
-        EXPECT_EQ(1, part.colors[i].a);
-    }
-}
-
-std::vector<std::byte> binary_ply(const std::string& vertices) {
-    std::vector<std::byte> bytes = bytes_of("ply\nformat binary_little_endian 1.0\nelement vertex " + vertices +
-                                            "\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
-                                            "property list uchar int vertex_indices\nend_header\n");
-    const float corners[] = {0, 0, 7, 3, 0, 7, 0, 4, 7};
-    const std::int32_t indices[] = {0, 1, 2};
-    const auto put = [&bytes](const auto& list) {
-        const auto* const at = reinterpret_cast<const std::byte*>(&list);
-        bytes.insert(bytes.end(), at, at + sizeof(list));
-    };
-    put(corners);
-    bytes.push_back(std::byte{3});
-    put(indices);
-    return bytes;
-}
-
-TEST(Ply, BinaryIsRead) {
-    const scene scene = load("b.ply", binary_ply("3"));
-    EXPECT_DOUBLE_EQ(6, area_of(scene));
-    EXPECT_EQ(glm::dvec3(3, 4, 7), bounds_of(scene).high);
-}
-
-constexpr const char* tetrahedron_off = "OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n"
-                                        "3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
-
-TEST(Off, FacesAreRead) {
-    const scene scene = load("t.off", tetrahedron_off);
-    EXPECT_EQ(4U, scene.triangle_count());
-    EXPECT_NEAR(1.5 + std::sqrt(3) / 2, area_of(scene), 1e-6);
-}
+constexpr const char* square_obj = "v 0 0 5\nv 2 0 5\nv 2 2 5\nv 0 2 5\nf 1 2 3 4\n";
 
 // ---- Files that are wrong
 // --------------------------------------------------------------------------------------------
@@ -366,13 +59,7 @@ struct sample {
     std::vector<std::byte> bytes;
 };
 
-std::vector<sample> samples() {
-    return {{"square.obj", bytes_of(square_obj)},
-            {"one.stl", bytes_of(triangle_stl)},
-            {"b.stl", binary_stl(1)},
-            {"b.ply", binary_ply("3")},
-            {"t.off", bytes_of(tetrahedron_off)}};
-}
+std::vector<sample> samples() { return {{"square.obj", bytes_of(square_obj)}}; }
 
 // Any outcome but an end of this process, and errors are one line (error_of).
 TEST(AssimpMalformed, FilesMayEndAnywhere) {
@@ -401,23 +88,8 @@ TEST(AssimpMalformed, BytesMayBeWrong) {
     }
 }
 
-TEST(AssimpMalformed, CountsWithoutDataBehindThemAreRefused) {
-    const std::string line = error_of("m.off", bytes_of("OFF\n4294967295 1 1\n0 0 0\n"));
-    EXPECT_EQ(0U, line.find("assimp")) << line;
-    EXPECT_NE("no error", error_of("m.stl", binary_stl(0xFFFFFFFF)));
-    (void)error_of("m.ply", binary_ply("4000000000"));
-}
-
-TEST(AssimpMalformed, APlyHeaderWithoutEndIsRefused) {
-    EXPECT_EQ("assimp: the PLY header has no end_header", error_of("m.ply", bytes_of("ply\nformat ascii 1.0\n")));
-}
-
 TEST(AssimpMalformed, IndicesThatPointNowhereAreRefused) {
     EXPECT_NE("no error", error_of("m.obj", bytes_of("v 0 0 0\nv 1 0 0\nf 1 2 9\n")));
-    // Whatever assimp makes of these, no index leaves its list (from_bytes sees to that).
-    for (const char* text :
-         {"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 77\n", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n"})
-        (void)error_of("m.off", bytes_of(text));
 }
 
 TEST(AssimpMalformed, MemoryIsBoundedByTheFilesSize) {
@@ -436,43 +108,12 @@ TEST(AssimpMalformed, MemoryIsBoundedByTheFilesSize) {
 }
 
 TEST(AssimpMalformed, TheExtensionChoosesTheReader) {
-    EXPECT_TRUE(voxelize::is_for_assimp(".obj"));
-    EXPECT_TRUE(voxelize::is_for_assimp(".stl"));
-    EXPECT_TRUE(voxelize::is_for_assimp(".ply"));
-    EXPECT_TRUE(voxelize::is_for_assimp(".off"));
+    EXPECT_FALSE(voxelize::is_for_assimp(".obj"));
+    for (const char* own : {".stl", ".ply", ".off"}) EXPECT_FALSE(voxelize::is_for_assimp(own)) << own;
     EXPECT_FALSE(voxelize::is_for_assimp(".glb"));
     EXPECT_FALSE(voxelize::is_for_assimp(".gltf"));
     EXPECT_FALSE(voxelize::is_for_assimp(".txt"));
     EXPECT_FALSE(voxelize::is_for_assimp(""));
-}
-
-// The models of Debian's package assimp-testmodels, where it is installed: each loads, or is refused in one line.
-TEST(AssimpModels, EachLoadsOrSaysWhyNot) {
-    const std::filesystem::path folder = "/usr/share/assimp/models";
-    if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << "no " << folder;
-    std::map<std::string, std::uint64_t> triangles;
-    std::size_t count = 0;
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
-        std::string extension = entry.path().extension().string();
-        std::transform(extension.begin(), extension.end(), extension.begin(),
-                       [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-        if (extension != ".obj" && extension != ".stl" && extension != ".ply" && extension != ".off") continue;
-        ++count;
-        const std::string name = entry.path().lexically_relative(folder).generic_string();
-        try {
-            triangles[name] = voxelize::load_by_assimp(entry.path()).triangle_count();
-        } catch (const voxelize::model_error& error) {
-            const std::string line = error.what();
-            EXPECT_FALSE(line.empty()) << name;
-            for (const char c : line) EXPECT_TRUE(c >= ' ' && c <= '~') << name << ": " << line;
-        }
-    }
-    EXPECT_GE(count, 40U);
-    EXPECT_GE(triangles.size(), 35U);
-    for (const char* same : {"OBJ/WusonOBJ.obj", "OFF/Wuson.off", "PLY/Wuson.ply", "STL/Wuson.stl"})
-        EXPECT_EQ(triangles.at("OFF/Wuson.off"), triangles.at(same)) << same;
-    for (const char* cube : {"OBJ/box.obj", "OFF/Cube.off", "PLY/cube.ply", "PLY/cube_binary.ply"})
-        EXPECT_EQ(12U, triangles.at(cube)) << cube;
 }
 
 } // namespace

@@ -282,7 +282,8 @@ TEST(GltfPictures, AFormatThatIsRefusedIsNamed) {
         file.root["extensionsRequired"] = {extension};
         return text_of(load(file).warnings);
     };
-    const std::string end = ", which is not supported (PNG, JPEG and WebP are); the colour factor is used alone\n";
+    const std::string end =
+        ", which is not supported (PNG, JPEG, WebP, TGA and BMP are); the colour factor is used alone\n";
     EXPECT_EQ("images[0] cannot be used: it is KTX2" + end,
               warning("KHR_texture_basisu", std::string_view("\xABKTX 20\xBB\r\n\x1A\n", 12)));
     EXPECT_EQ("images[0] cannot be used: it is AVIF" + end, warning("EXT_texture_avif", std::string_view("\0\0\0\x1C"

@@ -477,7 +477,8 @@ TEST(GltfScene, APictureThatCannotBeHadIsAWarning) {
     };
     EXPECT_NE(std::string::npos, with({{"uri", "away.png"}}).find("other files are not read"));
     EXPECT_NE(std::string::npos, with({{"uri", "../away.png"}}).find("leaves the folder"));
-    EXPECT_NE(std::string::npos, with({{"uri", "data:image/png;base64,AAAA"}}).find("neither PNG, JPEG nor WebP"));
+    EXPECT_NE(std::string::npos,
+              with({{"uri", "data:image/png;base64,AAAA"}}).find("neither PNG, JPEG, WebP, TGA nor BMP"));
     EXPECT_NE(std::string::npos, with({{"uri", "data:image/png;base64,iVBORw0KGgo="}}).find("the PNG is cut short"));
     EXPECT_NE(std::string::npos, with(json::object()).find("neither a uri"));
 }

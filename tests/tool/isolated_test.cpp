@@ -58,12 +58,13 @@ TEST(Isolated, ExceptionsComeBackAsOneLine) {
 }
 
 TEST(Isolated, ACrashIsAnError) {
-    EXPECT_EQ("it broke down on this file (signal " + std::to_string(SIGTERM) + ")",
+    const std::string what_to_do = ": convert it to another format, such as .glb or .obj, with a program that opens it";
+    EXPECT_EQ("it broke down on this file (signal " + std::to_string(SIGTERM) + ")" + what_to_do,
               error_of([]() -> std::vector<std::byte> {
                   raise(SIGTERM);
                   return {};
               }));
-    EXPECT_EQ("it broke down on this file", error_of([]() -> std::vector<std::byte> { _exit(0); }));
+    EXPECT_EQ("it broke down on this file" + what_to_do, error_of([]() -> std::vector<std::byte> { _exit(0); }));
 }
 
 TEST(Isolated, OneThatIsKilledEarlyDidNotTakeTooLong) {

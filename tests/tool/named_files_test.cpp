@@ -73,10 +73,9 @@ TEST(NamedFiles, SeveralLibrariesOfALine) {
     write(folder / "one.mtl", "newmtl a\n");
     write(folder / "my two.mtl", "newmtl b\nmap_Kd wood.png\n");
     write(folder / "wood.png", "0");
-    EXPECT_EQ(
-        (std::vector<fs::path>{folder.path() / "one.mtl", folder.path() / "my two.mtl", folder.path() / "gone.mtl",
-                               folder.path() / "wood.png", folder.path() / "wood.png"}),
-        voxelize::named_files(folder / "m.obj"));
+    EXPECT_EQ((std::vector<fs::path>{folder.path() / "one.mtl", folder.path() / "my two.mtl",
+                                     folder.path() / "gone.mtl", folder.path() / "wood.png"}),
+              voxelize::named_files(folder / "m.obj"));
     write(folder / "one.mtl my two.mtl gone.mtl", "newmtl c\n"); // the whole, where there is such a file
     EXPECT_EQ(std::vector<fs::path>{folder.path() / "one.mtl my two.mtl gone.mtl"},
               voxelize::named_files(folder / "m.obj"));

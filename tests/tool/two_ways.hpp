@@ -13,6 +13,10 @@
 
 namespace tool_test {
 
+// Vertices that no face names, so that a small PLY does not fit: a run that holds it has them all, one that streams it
+// has none.
+inline constexpr int spare_vertices = 500'000;
+
 struct two_ways {
     const scratch_folder& folder;
     std::string model;
@@ -38,15 +42,14 @@ struct two_ways {
         return tight;
     }
 
-    // The same, and into free.npz with the model in memory, where the build can load it: the files are equal, and so
-    // are the statistics but for memory, slabs and times.
+    // The same, and into free.npz with the model in memory: the files are equal, and so are the statistics but for
+    // memory, slabs and times.
     void expect_equal(int mebibytes) const {
         std::string text;
         for (const std::string& word : how) text += word + ' ';
         SCOPED_TRACE(text);
         const outcome tight = draw_streamed(mebibytes);
-        const bool is_gltf = model.ends_with(".glb") || model.ends_with(".gltf");
-        if (tight.code != 0 || (!is_gltf && !VOXELPIPE_TOOL_HAS_ASSIMP)) return;
+        if (tight.code != 0) return;
         const outcome free = draw("free.npz", {"--sparse"});
         ASSERT_EQ(0, free.code) << free.err;
         EXPECT_EQ(std::string::npos, free.err.find(" triangles do not fit")) << free.err;

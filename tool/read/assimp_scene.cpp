@@ -9,7 +9,9 @@
 #include "read/gltf/resources.hpp"
 
 #include <algorithm>
+#include <array>
 #include <new>
+#include <string_view>
 #include <utility>
 
 namespace voxelize {
@@ -49,7 +51,8 @@ scene to_scene(assimp::model source, const gltf_file_reader& read_file, gltf::bu
 } // namespace
 
 bool is_for_assimp(const std::string& extension) {
-    return extension != ".gltf" && extension != ".glb" && assimp::reads(extension);
+    constexpr std::array<std::string_view, 6> by_others{".gltf", ".glb", ".obj", ".off", ".ply", ".stl"};
+    return std::find(by_others.begin(), by_others.end(), extension) == by_others.end() && assimp::reads(extension);
 }
 
 scene load_by_assimp(std::span<const std::byte> bytes, const std::string& name, const gltf_file_reader& read_file,

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// OBJ/MTL, STL, PLY, OFF and what else assimp reads -> scene. The import runs in a process of its own, with bounds on
-// time and memory that grow with the file: a malformed or hostile file gives a model_error of one line.
+// What assimp reads, but for formats with readers of their own (mesh/) -> scene. The import runs in a
+// process of its own, with bounds on time and memory that grow with the file: a malformed or hostile file gives a
+// model_error of one line.
 //
 // Positions are in the file's own units and axes: nothing is rescaled or turned, but where a format states its unit or
 // upright axis and assimp follows that (Collada), which is a warning. Colours of materials and vertices are taken as
@@ -20,7 +21,7 @@
 
 namespace voxelize {
 
-// True if files with this extension (".obj", lower case) are for load_by_assimp. In a build without assimp: those that
+// True if files with this extension (".stl", lower case) are for load_by_assimp. In a build without assimp: those that
 // assimp is best known for.
 [[nodiscard]] bool is_for_assimp(const std::string& extension);
 

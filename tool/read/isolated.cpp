@@ -39,6 +39,9 @@ constexpr bool bounds_memory = false;
 constexpr bool bounds_memory = true;
 #endif
 
+// Ends messages of a breakdown, for which nothing in the file can be named.
+constexpr const char* what_to_do = ": convert it to another format, such as .glb or .obj, with a program that opens it";
+
 // The first byte that comes back.
 enum class outcome : unsigned char { done = 'd', failed = 'f', no_memory = 'm' };
 
@@ -164,9 +167,9 @@ std::vector<std::byte> run_isolated(const std::function<std::vector<std::byte>()
         if (signal == SIGXCPU || signal == SIGKILL)
             throw model_error(who + " needs more than the " + std::to_string(limits.seconds) +
                               " s that a file of this size gets");
-        throw model_error(who + " broke down on this file (signal " + std::to_string(signal) + ")");
+        throw model_error(who + " broke down on this file (signal " + std::to_string(signal) + ")" + what_to_do);
     }
-    if (bytes.empty()) throw model_error(who + " broke down on this file");
+    if (bytes.empty()) throw model_error(who + " broke down on this file" + what_to_do);
     const auto how = static_cast<outcome>(bytes.front());
     bytes.erase(bytes.begin());
     if (how == outcome::done) return bytes;

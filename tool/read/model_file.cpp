@@ -5,6 +5,8 @@
 #include "assimp_scene.hpp"
 #include "model/memory.hpp"
 #include "read/assimp/file_name.hpp"
+#include "read/mesh/mesh_formats.hpp"
+#include "read/mesh/mesh_scene.hpp"
 
 #include <algorithm>
 
@@ -25,8 +27,10 @@ void scale_lengths(scene& model, double scale) {
 scene load_model(const std::filesystem::path& file, const load_options& options) {
     const load_hooks hooks{[&](scene& model) { scale_lengths(model, options.scale); }, options.picture_hook};
     const std::string extension = assimp::lower_extension(file);
-    if (!is_for_assimp(extension)) return load_gltf(file, options.limits, options.gltf, hooks);
+    const bool is_mesh = is_mesh_format(extension);
+    if (!is_mesh && !is_for_assimp(extension)) return load_gltf(file, options.limits, options.gltf, hooks);
     if (options.gltf.animation) throw model_error("--animation is for glTF models");
+    if (is_mesh) return scene_of(*open_mesh(file, options.gltf), file, options.limits, options.gltf, hooks);
     gltf_limits limits = options.limits;
     limits.room = std::min(limits.room, memory::room());
     return load_by_assimp(file, limits, options.gltf, hooks);

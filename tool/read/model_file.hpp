@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A model's file, of whatever format -> scene. glTF where the name ends in .gltf, .glb or nothing that is known, the
-// rest by assimp.
+// A model's file, of whatever format -> scene. STL, PLY and OFF by readers of our own, glTF where the name ends in
+// .gltf, .glb or nothing that is known, the rest by assimp.
 
 #include "gltf_scene.hpp"
 #include "model/scene.hpp"

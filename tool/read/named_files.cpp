@@ -6,15 +6,21 @@
 #include "model/model_error.hpp"
 #include "read/assimp/file_name.hpp"
 #include "read/gltf/resources.hpp"
+#include "read/mesh/mesh_formats.hpp"
+#include "read/obj/lines.hpp"
+#include "read/obj/materials.hpp"
+#include "read/obj/reader.hpp"
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 namespace voxelize {
@@ -60,29 +66,18 @@ void add_gltf_files(const fs::path& model, std::vector<fs::path>& files) {
     }
 }
 
-// Calls visit(rest) with what follows the first word of each line whose first word is KEY, or begins with it.
-template <class Visit>
-void for_each_line(const fs::path& file, const std::string& key, const Visit& visit) {
-    constexpr const char* blank = " \t\r";
-    std::ifstream in(file, std::ios::binary);
-    for (std::string line; std::getline(in, line);) {
-        const std::size_t first = line.find_first_not_of(blank);
-        if (first == std::string::npos || line.compare(first, key.size(), key) != 0) continue;
-        const std::size_t rest = line.find_first_not_of(blank, line.find_first_of(blank, first));
-        if (rest != std::string::npos) visit(line.substr(rest, line.find_last_not_of(blank) + 1 - rest));
-    }
-}
-
 void add_obj_files(const fs::path& model, std::vector<fs::path>& files) {
     const fs::path folder = model.parent_path();
-    for_each_line(model, "mtllib", [&](const std::string& name) {
-        const auto is_there = [&](const std::string& file) {
-            std::error_code error;
-            const auto path = assimp::local_file(file);
-            return path && fs::is_regular_file(folder / *path, error);
-        };
-        for (const std::string& library : assimp::material_libraries(name, is_there))
-            if (const auto path = assimp::local_file(library)) files.push_back(folder / *path);
+    const auto is_there = [&](const std::string& name) { return !obj::find_file(folder, name).empty(); };
+    obj::for_each_library_line(model, [&](std::string_view rest) {
+        for (const std::string& library : obj::library_names(rest, is_there)) {
+            const fs::path found = obj::find_file(folder, library);
+            const std::optional<fs::path> named = assimp::local_file(library);
+            if (!found.empty())
+                files.push_back(folder / found);
+            else if (named)
+                files.push_back(folder / *named);
+        }
     });
     const std::size_t libraries = files.size();
     for (std::size_t i = 0; i < libraries; ++i) {
@@ -95,29 +90,45 @@ void add_obj_files(const fs::path& model, std::vector<fs::path>& files) {
 
 std::vector<fs::path> named_pictures(const fs::path& library, const fs::path& folder) {
     std::vector<fs::path> files;
-    // A picture's name follows options, and may have blanks; it lies where it says, or beside the model.
-    const auto add_picture = [&](const std::string& text) {
-        for (std::size_t at = 0; at != std::string::npos; at = text.find_first_not_of(" \t", text.find(' ', at))) {
-            const std::optional<fs::path> path = assimp::local_file(text.substr(at));
-            std::error_code error;
-            if (path)
-                for (const fs::path& place : {folder / *path, folder / path->filename()})
-                    if (fs::is_regular_file(place, error)) files.push_back(place);
-            if (text.find(' ', at) == std::string::npos) break;
+    // A picture's name follows options, and may have blanks; it lies where it says, beside the library, or beside the
+    // model.
+    const auto add_picture = [&](std::string_view rest) {
+        while (!obj::trimmed(rest).empty()) {
+            for (const std::string_view text : {rest, obj::before_comment(rest)}) {
+                const std::optional<fs::path> path = assimp::local_file(obj::name_of(text));
+                std::error_code error;
+                if (!path) continue;
+                for (const fs::path& place : {folder / *path, library.parent_path() / *path, folder / path->filename()})
+                    if (fs::is_regular_file(place, error) &&
+                        std::find(files.begin(), files.end(), place) == files.end())
+                        files.push_back(place);
+            }
+            (void)obj::next_word(rest);
         }
     };
-    for (const char* const key : {"map_", "bump", "disp", "decal", "refl", "norm"})
-        for_each_line(library, key, add_picture);
+    try {
+        obj::line_reader lines(library);
+        for (std::string_view line; lines.next(line);) {
+            const std::string key = obj::lower(obj::next_word(line));
+            for (const char* const picture : {"map_", "bump", "disp", "decal", "refl", "norm"})
+                if (key.starts_with(picture)) add_picture(line);
+        }
+    } catch (const model_error&) { // no text: the loader says so
+    }
     return files;
 }
 
 std::vector<fs::path> named_files(const fs::path& model) {
     std::vector<fs::path> files;
     const std::string extension = assimp::lower_extension(model);
-    if (extension == ".obj")
-        add_obj_files(model, files);
-    else if (!is_for_assimp(extension))
+    if (extension == ".obj") {
+        try {
+            add_obj_files(model, files);
+        } catch (const model_error&) { // it cannot be read: the loader says so
+        }
+    } else if (!is_mesh_format(extension) && !is_for_assimp(extension)) {
         add_gltf_files(model, files);
+    }
     return files;
 }
 

@@ -10,14 +10,15 @@
 namespace voxelize {
 
 bool is_for_assimp(const std::string& extension) {
-    constexpr std::array<std::string_view, 16> known{".obj", ".stl", ".ply", ".off", ".fbx",   ".dae", ".3ds", ".3mf",
-                                                     ".x3d", ".wrl", ".dxf", ".lwo", ".blend", ".amf", ".ase", ".x"};
+    constexpr std::array<std::string_view, 12> known{".fbx", ".dae", ".3ds",   ".3mf", ".x3d", ".wrl",
+                                                     ".dxf", ".lwo", ".blend", ".amf", ".ase", ".x"};
     return std::find(known.begin(), known.end(), extension) != known.end();
 }
 
 scene load_by_assimp(const std::filesystem::path&, const gltf_limits&, const gltf_options&, const load_hooks&) {
     throw model_error(
-        "this build reads glTF only, since it has no assimp: convert the file (`assimp export IN OUT.glb`, "
+        "this build reads glTF, OBJ, OFF, PLY and STL only, since it has no assimp: convert the file (`assimp "
+        "export IN OUT.glb`, "
         "or Blender), or install libassimp-dev and build again");
 }
 

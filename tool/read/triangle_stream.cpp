@@ -6,12 +6,13 @@
 #include "model/finite.hpp"
 #include "model/memory.hpp"
 #include "model/model_error.hpp"
-#include "obj_file.hpp"
-#include "ply_file.hpp"
 #include "read/assimp/file_name.hpp"
-#include "stl_file.hpp"
+#include "read/mesh/mesh_formats.hpp"
+#include "read/mesh/mesh_stream.hpp"
+#include "read/obj/stream.hpp"
 
 #include <algorithm>
+#include <system_error>
 
 namespace voxelize {
 
@@ -59,13 +60,27 @@ void triangle_stream::add_only_part(const std::filesystem::path& file, std::uint
     if (num_triangles != 0) parts_.push_back({file.filename().string(), {}, 0, 0, num_triangles});
 }
 
+namespace {
+
+// True unless a file is so small that what it holds surely fits: a triangle is not read from less than a byte.
+bool may_not_fit(const std::filesystem::path& file, const stream_room& room) {
+    constexpr double most_by_byte = 300;
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(file, error)) return false;
+    const auto bytes = static_cast<double>(std::filesystem::file_size(file, error));
+    return !error && most_by_byte * bytes > room.loaded;
+}
+
+} // namespace
+
 opened_stream open_stream(const std::filesystem::path& file, const stream_room& room,
                           const std::filesystem::path& folder, const load_options& options) {
     const std::string extension = assimp::lower_extension(file);
     opened_stream opened;
-    if (extension == ".stl") opened.stream = stl_file::open(file, options.gltf.colors);
-    if (extension == ".ply") opened.stream = ply_file::open(file, room.stream, options.gltf.colors);
-    if (extension == ".obj") opened = open_obj(file, room, folder, options.limits, options.gltf);
+    if (extension == ".obj")
+        opened = open_obj_stream(file, room, folder, options.limits, options.gltf);
+    else if (is_mesh_format(extension) && !options.gltf.animation && may_not_fit(file, room))
+        opened = stream_of(open_mesh(file, options.gltf), file, room, folder, options.limits, options.gltf);
     if (extension == ".glb" || extension == ".gltf")
         opened.stream = gltf_stream::open(file, room, options.limits, options.gltf);
     // The open stream has taken some of the room.

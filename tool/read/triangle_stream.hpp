@@ -115,9 +115,9 @@ struct stream_room {
     double loaded = 0;        // held as a whole, with all that a run takes for that
 };
 
-// The file as a stream, where it is of a kind that can be read so (stl_file.hpp, ply_file.hpp, gltf_stream.hpp,
-// obj_file.hpp) and is not likely to fit when it is loaded. folder: for temporary files, of OBJ. Throws as open_obj()
-// does.
+// The file as a stream, where it is of a kind that can be read so (mesh/mesh_formats.hpp, gltf_stream.hpp,
+// obj/stream.hpp) and is not likely to fit when it is loaded. folder: for temporary files. Throws as open_obj_stream()
+// and stream_of() do.
 [[nodiscard]] opened_stream open_stream(const std::filesystem::path& file, const stream_room& room,
                                         const std::filesystem::path& folder, const load_options& options);
 

@@ -39,7 +39,8 @@ glm::vec3 position_layout::value(const char* vertex) const {
     glm::vec3 p;
     for (std::size_t a = 0; a < 3; ++a)
         p[static_cast<glm::length_t>(a)] =
-            is_double[a] ? static_cast<float>(load<double>(vertex + place[a])) : load<float>(vertex + place[a]);
+            is_double[a] ? static_cast<float>(load<double>(vertex + place[a]) - origin[static_cast<glm::length_t>(a)])
+                         : load<float>(vertex + place[a]);
     return p;
 }
 

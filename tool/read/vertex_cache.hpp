@@ -31,6 +31,7 @@ struct position_layout {
     std::size_t stride = 0;  // bytes from one to the next
     std::size_t place[3]{};  // bytes of x, y and z from there
     bool is_double[3]{};     // otherwise float
+    glm::dvec3 origin{0.0};  // which values count from
 
     // The bytes that a vertex takes, up to the end of its last component: less than `stride` where others follow.
     [[nodiscard]] std::size_t bytes() const;

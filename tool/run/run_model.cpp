@@ -313,8 +313,14 @@ void run_either_way(const command_line& given, clock::time_point begin, output_c
     report.stats.milliseconds.emplace_back("options", options_ms);
     opened_stream opened = streamed_input(options, folder, static_cast<double>(memory::room()));
     bool helps_to_stream = true;
+    // The model, which is large, is no stream for a reason that is told with its need.
+    const auto tell_refusal = [&] {
+        if (!opened.refusal.empty())
+            memory::require(static_cast<double>(memory::room()) + 1, "the model", opened.refusal, opened.need);
+    };
     const auto keep_for_later = [&]() -> std::exception_ptr { // within a handler
-        if (!helps_to_stream || !opened.refusal.empty()) throw;
+        if (!helps_to_stream) throw;
+        tell_refusal();
         return std::current_exception();
     };
     std::exception_ptr shortage;
@@ -327,7 +333,10 @@ void run_either_way(const command_line& given, clock::time_point begin, output_c
     }
     if (!shortage) return;
     opened = streamed_input(options, folder, 0);
-    if (!opened.stream) std::rethrow_exception(shortage);
+    if (!opened.stream) {
+        tell_refusal();
+        std::rethrow_exception(shortage);
+    }
     report = {};
     report.stats.milliseconds.emplace_back("options", options_ms);
     run(options, begin, opened, others, report, helps_to_stream);

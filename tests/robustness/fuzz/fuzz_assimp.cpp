@@ -49,7 +49,7 @@ extern "C" const char* __asan_default_options() { return "max_allocation_size_mb
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     if (size == 0) return 0;
-    constexpr const char* names[] = {"m.obj", "m.stl", "m.ply", "m.off"};
+    constexpr const char* names[] = {"m.obj", "m.dae", "m.3ds", "m.3mf"};
     const unsigned kind = data[0] % 8;
     const std::span<const std::byte> rest = std::as_bytes(std::span(data, size)).subspan(1);
     voxelize::gltf_limits limits;

@@ -6,6 +6,7 @@
 #include "file_system.hpp"
 #include "linear_color.hpp"
 #include "model/finite.hpp"
+#include "package_3mf.hpp"
 #include "read/gltf/text.hpp"
 
 #include <assimp/Importer.hpp>
@@ -18,22 +19,13 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
 namespace voxelize::assimp {
 
 namespace {
-
-// Faults that assimp finds too late.
-void check_text(std::span<const std::byte> bytes, const std::string& extension) {
-    const std::string_view text{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-    if (extension == ".obj" && (text.starts_with("\xFE\xFF") || text.starts_with("\xFF\xFE")))
-        throw std::runtime_error("the file is text in UTF-16, not UTF-8");
-    // Looked for without end otherwise.
-    if (extension == ".ply" && text.find("end_header") == std::string_view::npos)
-        throw std::runtime_error("the PLY header has no end_header");
-}
 
 // ---- Materials
 // -------------------------------------------------------------------------------------------------------
@@ -195,28 +187,8 @@ void read_nodes(model& result, const aiNode& root, const std::vector<std::vector
     }
 }
 
-// Without its library a material of an OBJ is only a name, and assimp's grey.
-void warn_of_libraries(model& result, const aiScene& scene, const file_system& files) {
-    const std::vector<std::string>& missing = files.missing_libraries();
-    if (missing.empty()) return;
-    bool any_is_known = false;
-    for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
-        aiString name;
-        const bool is_known =
-            scene.mMaterials[i]->Get(AI_MATKEY_NAME, name) == aiReturn_SUCCESS && files.has_material(name.C_Str());
-        any_is_known = any_is_known || is_known;
-        if (!is_known) result.materials[i].base_color = glm::vec4(1);
-    }
-    for (const std::string& library : missing)
-        result.warnings.push_back("the material library " + gltf::in_quotes(library) + " cannot be read: " +
-                                  (files.stand_in() ? gltf::in_quotes(*files.stand_in()) + " is read in its place"
-                                   : any_is_known   ? "surfaces of its materials are white"
-                                                    : "surfaces are white"));
-}
-
 // Collada's importer turns the file's units into metres.
-void warn_of_units(model& result, const aiNode& root, const std::string& extension) {
-    if (extension != ".dae" && extension != ".zae") return;
+void warn_of_units(model& result, const aiNode& root) {
     const aiMatrix4x4& m = root.mTransformation;
     const double scale = std::cbrt(std::abs(static_cast<double>(m.Determinant())));
     if (std::abs(scale - 1) < 1e-6 || !(scale > 0)) return;
@@ -225,13 +197,29 @@ void warn_of_units(model& result, const aiNode& root, const std::string& extensi
     result.warnings.push_back("the file's unit is " + std::string(text) + " m: lengths are in metres");
 }
 
+// It also turns the axis that the file states as upright to Y.
+void warn_of_axes(model& result, std::span<const std::byte> bytes) {
+    const std::string_view text{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+    constexpr std::string_view key = "<up_axis>", blank = " \t\r\n";
+    const std::size_t at = text.find(key);
+    if (at == std::string_view::npos) return;
+    const std::size_t value = text.find_first_not_of(blank, at + key.size());
+    if (value == std::string_view::npos) return;
+    const std::string_view axis = text.substr(value, 4);
+    if (axis == "Z_UP")
+        result.warnings.emplace_back("the file states Z as upright: it is turned to Y, so x, y, z become x, z, -y");
+    if (axis == "X_UP")
+        result.warnings.emplace_back("the file states X as upright: it is turned to Y, so x, y, z become -y, x, z");
+}
+
 } // namespace
 
 bool reads(const std::string& extension) { return Assimp::Importer{}.IsExtensionSupported(extension); }
 
 model read_model(std::span<const std::byte> bytes, const std::string& name, const gltf_file_reader& read_file) {
     const std::string extension = lower_extension(name);
-    check_text(bytes, extension);
+    if (extension == ".3mf")
+        if (std::optional<model> package = read_package_3mf(bytes)) return std::move(*package);
     Assimp::Importer importer;
     auto* const files = new file_system(bytes, name, read_file);
     importer.SetIOHandler(files); // the importer owns it
@@ -245,7 +233,6 @@ model read_model(std::span<const std::byte> bytes, const std::string& name, cons
     model result;
     for (unsigned i = 0; i < scene->mNumMaterials; ++i) add_material(result, *scene->mMaterials[i], *scene);
     for (unsigned i = 0; i < scene->mNumTextures; ++i) add_embedded(result, *scene->mTextures[i]);
-    warn_of_libraries(result, *scene, *files);
     result.files = files->others();
     left_out without;
     std::vector<std::vector<std::uint32_t>> primitives_of(scene->mNumMeshes); // by mesh
@@ -255,7 +242,10 @@ model read_model(std::span<const std::byte> bytes, const std::string& name, cons
             result.primitives.push_back(std::move(part));
         }
     read_nodes(result, *scene->mRootNode, primitives_of, without);
-    warn_of_units(result, *scene->mRootNode, extension);
+    if (extension == ".dae" || extension == ".zae") {
+        warn_of_units(result, *scene->mRootNode);
+        warn_of_axes(result, bytes);
+    }
     const auto warn = [&](std::size_t count, const char* what) {
         if (count != 0) result.warnings.push_back(std::to_string(count) + ' ' + what);
     };

@@ -6,12 +6,14 @@
 #include "read/gltf/picture_file.hpp"
 #include "read/gltf/text.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <new>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace voxelize::assimp {
@@ -61,22 +63,88 @@ public:
 
 private:
     static std::string key_of(const texture_source& wanted) {
-        return wanted.path.empty() ? '*' + std::to_string(wanted.embedded) : wanted.path;
+        std::string key = wanted.path;
+        if (key.empty() && wanted.embedded >= 0) key = '*' + std::to_string(wanted.embedded);
+        if (wanted.alpha_path.empty()) return key;
+        if (!key.empty()) key += " with ";
+        return key + wanted.alpha_path + (wanted.alpha_channel != 0 ? std::string(":") + wanted.alpha_channel : "");
     }
 
     picture decode(const texture_source& wanted) const {
-        if (wanted.path.empty()) {
-            const embedded_picture& embedded = source_.embedded[static_cast<std::size_t>(wanted.embedded)];
-            if (embedded.width == 0) return gltf::decode_picture(embedded.bytes, memory_.limits());
-            if (embedded.height == 0) throw model_error("it has no pixels");
-            memory_.charge(embedded.bytes.size(), 1, "an embedded texture");
-            picture result;
-            result.width = embedded.width;
-            result.height = embedded.height;
-            for (const std::byte byte : embedded.bytes) result.rgba.push_back(std::to_integer<std::uint8_t>(byte));
-            return result;
+        if (wanted.alpha_path.empty()) return decode_color(wanted);
+        const bool is_alone = wanted.path.empty() && wanted.embedded < 0;
+        picture alpha;
+        try {
+            alpha = decode_file(wanted.alpha_path);
+        } catch (const model_error& error) {
+            if (is_alone) throw;
+            scene_.warnings.push_back("the texture " + gltf::in_quotes(wanted.alpha_path) +
+                                      " cannot be used: " + error.what() + "; the material's colours are opaque");
+            return decode_color(wanted);
         }
-        const std::optional<std::filesystem::path> path = local_file(wanted.path);
+        if (is_alone) {
+            picture white;
+            white.width = white.height = 1;
+            white.rgba.assign(4, 255);
+            return with_alpha(white, alpha, wanted.alpha_channel);
+        }
+        return with_alpha(wanted.path == wanted.alpha_path ? opaque(alpha) : decode_color(wanted), alpha,
+                          wanted.alpha_channel);
+    }
+
+    static picture opaque(picture shown) {
+        for (std::size_t at = 3; at < shown.rgba.size(); at += 4) shown.rgba[at] = 255;
+        return shown;
+    }
+
+    // COLOR, with its alpha multiplied by a channel of ALPHA, at the greater size of both along each axis.
+    picture with_alpha(const picture& color, const picture& alpha, char channel) const {
+        const auto is_opaque = [&alpha] {
+            for (std::size_t at = 3; at < alpha.rgba.size(); at += 4)
+                if (alpha.rgba[at] != 255) return false;
+            return true;
+        };
+        constexpr std::string_view channels = "rgbm";
+        std::size_t which = channels.find(channel);
+        if (which == std::string_view::npos && channel != 'l' && !is_opaque()) which = 3;
+        picture result;
+        result.width = std::max(color.width, alpha.width);
+        result.height = std::max(color.height, alpha.height);
+        memory_.charge(std::uint64_t{result.width} * result.height, 4, "a texture with its alpha");
+        result.rgba.resize(std::size_t{4} * result.width * result.height);
+        const auto texel = [&result](const picture& of, std::uint32_t x, std::uint32_t y) {
+            const std::size_t column = std::uint64_t{x} * of.width / result.width;
+            const std::size_t row = std::uint64_t{y} * of.height / result.height;
+            return of.rgba.data() + 4 * (row * of.width + column);
+        };
+        std::uint8_t* to = result.rgba.data();
+        for (std::uint32_t y = 0; y < result.height; ++y)
+            for (std::uint32_t x = 0; x < result.width; ++x, to += 4) {
+                const std::uint8_t *const c = texel(color, x, y), *const a = texel(alpha, x, y);
+                // Rec. 601, in 1/256.
+                const unsigned value =
+                    which != std::string_view::npos ? a[which] : (77U * a[0] + 150U * a[1] + 29U * a[2] + 128U) >> 8U;
+                std::copy_n(c, 3, to);
+                to[3] = static_cast<std::uint8_t>((c[3] * value + 127U) / 255U);
+            }
+        return result;
+    }
+
+    picture decode_color(const texture_source& wanted) const {
+        if (!wanted.path.empty()) return decode_file(wanted.path);
+        const embedded_picture& embedded = source_.embedded[static_cast<std::size_t>(wanted.embedded)];
+        if (embedded.width == 0) return gltf::decode_picture(embedded.bytes, memory_.limits());
+        if (embedded.height == 0) throw model_error("it has no pixels");
+        memory_.charge(embedded.bytes.size(), 1, "an embedded texture");
+        picture result;
+        result.width = embedded.width;
+        result.height = embedded.height;
+        for (const std::byte byte : embedded.bytes) result.rgba.push_back(std::to_integer<std::uint8_t>(byte));
+        return result;
+    }
+
+    picture decode_file(const std::string& name) const {
+        const std::optional<std::filesystem::path> path = local_file(name);
         if (!path) throw model_error("it is no file's name");
         if (!read_file_) throw model_error("other files are not read");
         // At the path that the model names, else beside the model.
@@ -116,7 +184,8 @@ void name_files(const model& source, const gltf_options& options) {
     };
     for (const std::string& file : source.files) name(file, false);
     for (const texture_source& texture : source.textures)
-        if (!texture.path.empty()) name(texture.path, true);
+        for (const std::string* const path : {&texture.path, &texture.alpha_path})
+            if (!path->empty()) name(*path, true);
 }
 
 void load_pictures(const model& source, const std::vector<bool>& asked_for, const gltf_file_reader& read_file,

@@ -23,8 +23,12 @@ struct texture_source {
     std::int32_t embedded = -1; // index into model::embedded
     wrap_mode wrap_s = wrap_mode::repeat;
     wrap_mode wrap_t = wrap_mode::repeat;
+    // A picture of alpha alone (map_d of an OBJ), which multiplies that of the texture; empty: none.
+    std::string alpha_path;
+    // The channel of that: 'r', 'g', 'b', 'm' (alpha) or 'l' (luminance); else alpha, or luminance where it is opaque.
+    char alpha_channel = 0;
 
-    [[nodiscard]] bool is_there() const { return !path.empty() || embedded >= 0; }
+    [[nodiscard]] bool is_there() const { return !path.empty() || embedded >= 0 || !alpha_path.empty(); }
 };
 
 // An encoded picture, or with a width pixels of RGBA.

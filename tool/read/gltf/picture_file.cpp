@@ -22,22 +22,15 @@ namespace voxelize::gltf {
 
 namespace {
 
-enum class picture_format { png, jpeg, webp, other };
+enum class picture_format { png, jpeg, webp, bmp, tga, other };
 
 // MAGIC stands AT bytes behind the start.
 bool has_magic(std::span<const std::byte> bytes, std::size_t at, std::string_view magic) {
     return bytes.size() >= at + magic.size() && std::memcmp(bytes.data() + at, magic.data(), magic.size()) == 0;
 }
 
-picture_format format_of(std::span<const std::byte> bytes) {
-    if (has_magic(bytes, 0, "\x89PNG\r\n\x1a\n")) return picture_format::png;
-    if (has_magic(bytes, 0, "\xFF\xD8\xFF")) return picture_format::jpeg;
-    if (has_magic(bytes, 0, "RIFF") && has_magic(bytes, 8, "WEBP")) return picture_format::webp;
-    return picture_format::other;
-}
-
-// The reason why BYTES, which are in none of the formats above, are refused.
-std::string reason_against(std::span<const std::byte> bytes) {
+// The name of a format that is known and not supported, by the signature of BYTES; null for all others.
+const char* unsupported_format(std::span<const std::byte> bytes) {
     struct known {
         std::size_t at;
         std::string_view magic;
@@ -49,14 +42,28 @@ std::string reason_against(std::span<const std::byte> bytes) {
                                  {4, "ftypavif"sv, "AVIF"},
                                  {0, "DDS "sv, "DDS"},
                                  {0, "GIF8"sv, "GIF"},
-                                 {0, "BM"sv, "BMP"},
                                  {0, "II*\0"sv, "TIFF"},
                                  {0, "MM\0*"sv, "TIFF"},
                                  {0, "sB"sv, "Basis Universal"}};
     for (const known& format : formats)
-        if (has_magic(bytes, format.at, format.magic))
-            return std::string("it is ") + format.name + ", which is not supported (PNG, JPEG and WebP are)";
-    return "it is neither PNG, JPEG nor WebP";
+        if (has_magic(bytes, format.at, format.magic)) return format.name;
+    return nullptr;
+}
+
+picture_format format_of(std::span<const std::byte> bytes) {
+    if (has_magic(bytes, 0, "\x89PNG\r\n\x1a\n")) return picture_format::png;
+    if (has_magic(bytes, 0, "\xFF\xD8\xFF")) return picture_format::jpeg;
+    if (has_magic(bytes, 0, "RIFF") && has_magic(bytes, 8, "WEBP")) return picture_format::webp;
+    if (has_magic(bytes, 0, "BM")) return picture_format::bmp;
+    if (unsupported_format(bytes) == nullptr && is_tga(bytes)) return picture_format::tga;
+    return picture_format::other;
+}
+
+// The reason why BYTES, which are in none of the formats above, are refused.
+std::string reason_against(std::span<const std::byte> bytes) {
+    if (const char* const name = unsupported_format(bytes))
+        return std::string("it is ") + name + ", which is not supported (PNG, JPEG, WebP, TGA and BMP are)";
+    return "it is neither PNG, JPEG, WebP, TGA nor BMP";
 }
 
 // stb_image's reason in words that name what is damaged, whatever it says and if it says nothing.
@@ -137,6 +144,16 @@ picture decode_picture(std::span<const std::byte> bytes, const gltf_limits& limi
         return decode_by_stb(bytes, "JPEG");
     case picture_format::webp:
         return decode_webp(bytes, limits);
+    case picture_format::bmp:
+        check_bmp(bytes, limits);
+        return decode_by_stb(bytes, "BMP");
+    case picture_format::tga: {
+        check_tga(bytes, limits);
+        picture decoded = decode_by_stb(bytes, "TGA");
+        if (!states_tga_alpha(bytes))
+            for (std::size_t alpha = 3; alpha < decoded.rgba.size(); alpha += 4) decoded.rgba[alpha] = 255;
+        return decoded;
+    }
     case picture_format::other:
         break;
     }

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Encoded pictures -> RGBA: PNG and JPEG, and WebP in a build with libwebp. The bytes say what they are, not a file's
-// name or media type.
+// Encoded pictures -> RGBA: PNG, JPEG, TGA and BMP, and WebP in a build with libwebp. The bytes say what they are, not
+// a file's name or media type.
 
 #include "read/gltf_scene.hpp"
 

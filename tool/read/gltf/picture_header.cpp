@@ -4,6 +4,7 @@
 
 #include "text.hpp"
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <string>
@@ -21,6 +22,12 @@ std::uint64_t big_endian(std::span<const std::byte> bytes, std::size_t at, std::
 
 std::string in_pixels(std::uint64_t width, std::uint64_t height) {
     return "its " + std::to_string(width) + " x " + std::to_string(height) + " pixels";
+}
+
+std::uint64_t little_endian(std::span<const std::byte> bytes, std::size_t at, std::size_t count) {
+    std::uint64_t number = 0;
+    for (std::size_t i = count; i-- > 0;) number = number << 8 | std::to_integer<std::uint64_t>(bytes[at + i]);
+    return number;
 }
 
 gltf_error impossible(std::uint64_t width, std::uint64_t height, std::uint64_t bytes, const char* kind) {
@@ -69,7 +76,100 @@ png_header header_of(std::span<const std::byte> content) {
     return header;
 }
 
+// The header of a TGA, as far as it matters here.
+struct tga_header {
+    std::uint64_t width = 0, height = 0, bits = 0, alpha_bits = 0;
+    bool has_map = false, is_packed = false, is_known = false;
+};
+
+constexpr std::size_t tga_header_bytes = 18;
+
+tga_header tga_header_of(std::span<const std::byte> bytes) {
+    tga_header header;
+    if (bytes.size() < tga_header_bytes) return header;
+    const std::uint64_t map = little_endian(bytes, 1, 1), type = little_endian(bytes, 2, 1);
+    header.has_map = map == 1;
+    header.is_packed = type >= 8;
+    header.width = little_endian(bytes, 12, 2);
+    header.height = little_endian(bytes, 14, 2);
+    header.bits = little_endian(bytes, 16, 1);
+    header.alpha_bits = little_endian(bytes, 17, 1) & 0xF;
+    const std::uint64_t color_type = type & 7;
+    const bool has_type = (type | 8) == (color_type | 8) && color_type >= 1 && color_type <= 3;
+    constexpr std::array<std::uint64_t, 5> depths{8, 15, 16, 24, 32};
+    header.is_known = map <= 1 && has_type && (color_type == 1) == header.has_map && header.width != 0 &&
+                      header.height != 0 && std::find(depths.begin(), depths.end(), header.bits) != depths.end();
+    return header;
+}
+
 } // namespace
+
+bool is_tga(std::span<const std::byte> bytes) { return tga_header_of(bytes).is_known; }
+
+bool states_tga_alpha(std::span<const std::byte> bytes) {
+    const tga_header header = tga_header_of(bytes);
+    return header.has_map || header.alpha_bits != 0;
+}
+
+bool may_have_alpha(std::span<const std::byte> start) {
+    const auto has_magic = [&](std::size_t at, std::string_view magic) {
+        return start.size() >= at + magic.size() &&
+               std::string_view(reinterpret_cast<const char*>(start.data()) + at, magic.size()) == magic;
+    };
+    if (has_magic(0, "\x89PNG\r\n\x1a\n")) {
+        if (start.size() < 26) return false;
+        const std::uint64_t type = big_endian(start, 25, 1);
+        if (type == 4 || type == 6) return true;
+        for (std::size_t at = 8; start.size() - at >= 8;) {
+            if (has_magic(at + 4, "tRNS")) return true;
+            if (has_magic(at + 4, "IDAT")) return false;
+            const std::uint64_t length = big_endian(start, at, 4) + 12;
+            if (length > start.size() - at) return false;
+            at += static_cast<std::size_t>(length);
+        }
+        return false;
+    }
+    if (has_magic(0, "RIFF") && has_magic(8, "WEBP")) {
+        if (has_magic(12, "VP8X") && start.size() > 20) return (little_endian(start, 20, 1) & 0x10) != 0;
+        return has_magic(12, "VP8L") && start.size() > 24 && (little_endian(start, 24, 1) & 0x10) != 0;
+    }
+    if (has_magic(0, "BM")) return start.size() > 30 && little_endian(start, 28, 2) == 32;
+    const tga_header header = tga_header_of(start);
+    return !has_magic(0, "\xFF\xD8\xFF") && header.is_known && header.alpha_bits != 0;
+}
+
+void check_tga(std::span<const std::byte> bytes, const gltf_limits& limits) {
+    const tga_header header = tga_header_of(bytes);
+    check_sides(header.width, header.height, limits);
+    const std::uint64_t pixel = (header.bits + 7) / 8, pixels = header.width * header.height;
+    constexpr std::uint64_t most_of_packet = 128; // pixels
+    const std::uint64_t least =
+        header.is_packed ? (pixels + most_of_packet - 1) / most_of_packet * (1 + pixel) : pixels * pixel;
+    if (least > bytes.size() - tga_header_bytes)
+        throw gltf_error("the TGA is cut short: " + in_pixels(header.width, header.height) + " cannot come from " +
+                         std::to_string(bytes.size()) + " bytes");
+}
+
+void check_bmp(std::span<const std::byte> bytes, const gltf_limits& limits) {
+    constexpr std::size_t core_header = 26, info_header = 54; // bytes, with those of the file
+    if (bytes.size() < core_header) throw gltf_error("the BMP is cut short within its header");
+    const std::uint64_t first = little_endian(bytes, 10, 4), size = little_endian(bytes, 14, 4);
+    const bool is_core = size == 12;
+    if (!is_core && bytes.size() < info_header) throw gltf_error("the BMP is cut short within its header");
+    const std::uint64_t width = is_core ? little_endian(bytes, 18, 2) : little_endian(bytes, 18, 4);
+    std::uint64_t height = is_core ? little_endian(bytes, 20, 2) : little_endian(bytes, 22, 4);
+    constexpr std::uint64_t sign = std::uint64_t{1} << 31;
+    if (!is_core && height >= sign) height = 2 * sign - height; // from the top down
+    const std::uint64_t bits = little_endian(bytes, is_core ? 24 : 28, 2);
+    const std::uint64_t compression = is_core ? 0 : little_endian(bytes, 30, 4);
+    if (compression != 0 && compression != 3)
+        throw gltf_error("it is a compressed BMP, and only those without compression are supported");
+    check_sides(width, height, limits);
+    const std::uint64_t least = (width * bits + 31) / 32 * 4 * height;
+    if (first > bytes.size() || least > bytes.size() - first)
+        throw gltf_error("the BMP is cut short: " + in_pixels(width, height) + " cannot come from " +
+                         std::to_string(bytes.size()) + " bytes");
+}
 
 void check_sides(std::uint64_t width, std::uint64_t height, const gltf_limits& limits) {
     const std::uint32_t side = limits.max_image_side;
