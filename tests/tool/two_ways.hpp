@@ -15,7 +15,7 @@ namespace tool_test {
 
 // Vertices that no face names, so that a small PLY does not fit: a run that holds it has them all, one that streams it
 // has none.
-inline constexpr int spare_vertices = 500'000;
+inline constexpr int spare_vertices = 1'200'000;
 
 struct two_ways {
     const scratch_folder& folder;
