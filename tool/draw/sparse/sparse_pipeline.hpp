@@ -9,7 +9,8 @@
 
 #include "brick_count.hpp"
 #include "brick_need.hpp"
-#include "draw/pipeline.hpp"
+#include "draw/pipeline_solid.hpp"
+#include "draw/pipeline_surface.hpp"
 #include "model/memory.hpp"
 #include "model/sparse_volume.hpp"
 #include "sparse_outside.hpp"
