@@ -233,7 +233,7 @@ sort_lists(const list_buffers<Key, Payload>& b, const output_pointers& outputs, 
     return lists;
 }
 
-// The same for primitives listed in any order, and writes the lists to the output pointers. The raster has run the
+// Sorts primitives listed in any order by voxel, and writes the lists to the output pointers. The raster has run the
 // preparation, except for fillers. spare: room for limits.fragments if the sorted voxels are needed afterwards;
 // otherwise null.
 template <class Payload>

@@ -83,7 +83,7 @@ struct make_lattice_room {
         if (!fits) state->stop = stopped;
     }
 };
-// The same for the triangles of draw number `draw`, which come last.
+// Decides whether the triangles of draw number `draw` fit, which come last.
 struct make_room {
     const unsigned long long* triangles;
     std::uint64_t capacity;
