@@ -14,6 +14,7 @@
 #include <voxelpipe/device/call/strategy.hpp>
 #include <voxelpipe/device/call/tiled_strategy.cuh>
 #include <voxelpipe/device/raster/raster_draws.cuh>
+#include <voxelpipe/voxelize.hpp>
 
 #include <algorithm>
 #include <cstdint>

@@ -8,6 +8,7 @@
 // just the bits in use follows, and each voxel's first fragment is selected. Fragments listed in any order are ordered
 // within each voxel on the way (fragments/order_voxels.cuh), and shaded then. Memory is proportional to the fragments.
 
+#include <voxelpipe/abuffer.hpp>
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/fragments/counting_sort.cuh>
 #include <voxelpipe/device/fragments/list_sink.cuh>

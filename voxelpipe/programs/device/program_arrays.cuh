@@ -7,7 +7,7 @@
 
 #include <voxelpipe/device/base/for_each.cuh>
 #include <voxelpipe/device/scene/prefix_sum.cuh>
-#include <voxelpipe/programs/device/async_output.cuh>
+#include <voxelpipe/device/voxelize_async.cuh>
 #include <voxelpipe/programs/passes/types.hpp>
 
 #include <cstddef>
