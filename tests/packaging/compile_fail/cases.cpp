@@ -32,6 +32,7 @@ namespace vp = voxelpipe;
 inline constexpr std::array<glm::vec3, 3> positions{{{0.0f, 0.0f, 0.0f}, {4.0f, 0.0f, 1.0f}, {0.0f, 4.0f, 2.0f}}};
 inline constexpr std::array<glm::uvec3, 1> triangles{{{0u, 1u, 2u}}};
 inline constexpr std::array<float, 3> heat{1.0f, 2.0f, 3.0f};
+inline const vp::mesh_view<> one_triangle{positions, triangles};
 constexpr vp::passthrough pass{};
 constexpr auto ones = [](const vp::fragment<>&) { return vp::outputs(1u); }; // a fragment shader for one counter
 using counter = vp::target<std::uint32_t, vp::blend::add>;
@@ -61,18 +62,18 @@ bool collect(const FragmentShader& fragment_shader) {
 }
 
 // Not templates: programs as a user writes them.
-#define DRAW(BACKEND_MEMORY, MESH, CALL, ...)                                                                          \
+#define DRAW(OUTPUT, MESH, CALL, ...)                                                                                  \
     inline bool run() {                                                                                                \
         vp::cpu_backend backend;                                                                                       \
-        BACKEND_MEMORY out{backend __VA_OPT__(, ) __VA_ARGS__};                                                        \
+        OUTPUT out{backend __VA_OPT__(, ) __VA_ARGS__};                                                                \
         const MESH;                                                                                                    \
         return CALL.ok();                                                                                              \
     }
 #define PROGRAM(PROGRAM_, SHADER)                                                                                      \
-    DRAW(framebuffer_of<counter>, vp::mesh_view<> mesh(positions, triangles),                                          \
+    DRAW(framebuffer_of<counter>, vp::mesh_view<> mesh = one_triangle,                                                 \
          vp::voxelize(backend, mesh, small_grid(), pass, PROGRAM_, SHADER, out), glm::ivec3(8))
 #define SOLID(OUTPUT, SHADER, ...)                                                                                     \
-    DRAW(OUTPUT, vp::mesh_view<> mesh(positions, triangles),                                                           \
+    DRAW(OUTPUT, vp::mesh_view<> mesh = one_triangle,                                                                  \
          vp::voxelize_solid(backend, mesh, small_grid(), pass, SHADER, out), __VA_ARGS__)
 #define OWN_BLEND                                                                                                      \
     using own = vp::target<surface, nearest>;                                                                          \
