@@ -296,7 +296,11 @@ bool payload_arity() {
 }
 #endif
 #if CASE_payload_bool || ALL // an A-buffer's payload cannot be bool
-bool payload_bool(vp::cpu_backend& b) { return vp::abuffer<vp::cpu_backend, WRONG(bool) RIGHT(std::uint8_t)>(b).num_voxels() == 0; }
+bool payload_bool() {
+    vp::cpu_backend backend;
+    const vp::abuffer<vp::cpu_backend, WRONG(bool) RIGHT(std::uint8_t)> lists{backend};
+    return lists.num_voxels() == 0;
+}
 #endif
 #if CASE_payload_owns_memory || ALL // payload must be trivially copyable
 using payload = WRONG(std::string) RIGHT(float);
