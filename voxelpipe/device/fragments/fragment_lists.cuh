@@ -113,12 +113,6 @@ struct list_buffers {
     std::size_t storage_bytes;
 };
 
-// True if up to `capacity` keys of this type are sorted by fragments/radix_sort.cuh; otherwise by scene/key_sort.cuh.
-template <class Key>
-[[nodiscard]] VOXELPIPE_HD constexpr bool are_sorted_here(std::uint64_t capacity) {
-    return sizeof(Key) == sizeof(std::uint32_t) && capacity < max_sorted;
-}
-
 // Arrays for counting and writing fragments.
 struct list_memory {
     cell_buffers cells;

@@ -6,6 +6,7 @@
 // programs/device/patches.cuh launch. Nothing here waits; what is counted stays on the device.
 
 #include <voxelpipe/device/base/for_each.cuh>
+#include <voxelpipe/device/fragments/store_lists.cuh>
 #include <voxelpipe/device/scene/prefix_sum.cuh>
 #include <voxelpipe/device/voxelize_async.cuh>
 #include <voxelpipe/programs/passes/types.hpp>
