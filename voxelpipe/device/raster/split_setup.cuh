@@ -10,6 +10,7 @@
 #include <voxelpipe/device/base/relaxed_access.cuh>
 #include <voxelpipe/device/raster/deferred_triangles.cuh>
 #include <voxelpipe/device/scene/count_and_emit.cuh>
+#include <voxelpipe/device/scene/triangle_source.cuh>
 
 #include <algorithm>
 #include <cstdint>
