@@ -211,9 +211,9 @@ VOXELPIPE_INLINE void for_each_column(const triangle_setup<Int>& t, const voxel_
     }
 }
 
-// The axis along which a bounding box is one voxel thick; -1 if there is none. A voxel of such a box is covered iff,
-// seen along that axis, its square meets the projected triangle, because the triangle lies within the voxel's
-// thickness.
+// The axis along which a bounding box is one voxel thick; -1 if it is thicker along every axis. A voxel of such a box
+// is covered iff, seen along that axis, its square meets the projected triangle, because the triangle lies within the
+// voxel's thickness.
 [[nodiscard]] VOXELPIPE_HD constexpr int slab_axis(const voxel_box& bounding_box) {
     for (int i = 2; i >= 0; --i)
         if (bounding_box.hi[i] == bounding_box.lo[i]) return i;

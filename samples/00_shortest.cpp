@@ -8,6 +8,7 @@
 namespace vp = voxelpipe;
 
 int main() {
+    // snippet: shortest
     const std::vector<glm::vec3> positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}; // a tetrahedron
     const std::vector<glm::uvec3> triangles{{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
 
@@ -18,6 +19,7 @@ int main() {
     const vp::status drawn = vp::voxelize(backend, mesh, grid, vp::passthrough{}, vp::constant(true), surface);
 
     const auto touched = vp::get<0>(surface).to_host_target(backend);
+    // end snippet
     std::printf("%s: %llu voxels, the centre is %d\n", drawn.message().c_str(),
                 static_cast<unsigned long long>(drawn.counts.voxels), touched(32, 32, 32));
     return drawn.ok() && drawn.counts.voxels != 0 && !touched(32, 32, 32) ? 0 : 1;

@@ -36,7 +36,7 @@ struct gear {
             }
         }
     }
-    // Its place, turned by so many teeth.
+    // The place of the gear, turned by `turned` teeth.
     [[nodiscard]] vp::transform at(float x, float z, float turned) const {
         const float a = full_turn * turned / static_cast<float>(teeth), c = std::cos(a), s = std::sin(a);
         return {glm::mat4(c, 0, s, 0, 0, 1, 0, 0, -s, 0, c, 0, x, 8, z, 1)};

@@ -12,7 +12,7 @@
 3. Names of sources in backticks (`*.hpp`, `*.cuh`, `*.cpp`, `*.cu`, `*.py`, `*.sh`) are names of files that exist.
 4. docs/extending.md has at least five recipes of `##`, at most 160 lines, and paths in backticks from the root that exist.
 
-docs/notebook/ keeps the names of its time and is not checked for 3. Needs the standard library only.
+Needs the standard library only.
 """
 import argparse
 import pathlib
@@ -102,8 +102,7 @@ def main():
         elif fresh != text:
             errors.append(f"{name} shows other code than its samples; scripts/check_documents.py --update writes it")
         errors += [f"{name}: {what}" for what in check_links(path, fresh)]
-        if not name.startswith("docs/notebook/"):
-            errors += [f"{name}: {what}" for what in check_names(FENCED.sub("", fresh), files)]
+        errors += [f"{name}: {what}" for what in check_names(FENCED.sub("", fresh), files)]
         if name == "docs/extending.md":
             errors += [f"{name}: {what}" for what in check_recipes(fresh)]
     for line in errors:

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the direction of the library's includes. Prints each include that breaks a rule; the exit status is 1 if any does.
+"""Checks the direction of the includes of the library and of the tool. Prints each include that breaks a rule; the exit status is 1 if any does.
 
 The library's parts, from the top down; an include names a file of the same part or of a part further down:
 
@@ -28,6 +28,13 @@ Outside a device/ folder only voxelpipe.hpp and .cuh files include one. cpu_ref/
 cpu_ref/sparse stand above its other files, and cpu_ref/backend.hpp includes all. It includes no device/. No include cycle
 anywhere. At most four files lie directly in device/. Forwarding headers are left out.
 
+The tool's folders, from the top down; tool/ itself has main.cpp, which may include all of them:
+
+    run
+    draw
+    read, write    (neither includes the other)
+    model
+
     scripts/check_includes.py [--depth N] [ROOT]
 
 --depth N: also fails if a chain of includes that begins at voxelpipe.hpp has more than N files, and prints the longest.
@@ -42,6 +49,7 @@ MODULES = ["slabs", "programs", "sparse", "solid", "levels", "api", "core"]  # o
 MAX_LOOSE = 4  # files directly in device/: what a reader meets first
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in (folders.split() or [""])}
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)
+TOOL_LEVEL = {"": 0, "run": 1, "draw": 2, "read": 3, "write": 3, "model": 4}  # folders of tool/, from the top down
 UMBRELLAS = ("voxelpipe/voxelpipe.hpp", "cpu_ref/backend.hpp")
 
 
@@ -91,6 +99,35 @@ def complaint(source, target):
         if to_folder not in LEVEL or LEVEL[to_folder] <= LEVEL[folder]:
             return f"device/{folder} may not include device/{to_folder}: includes run downward"
     return None
+
+
+def tool_folder(name):
+    """The layer of a file of tool/: its first folder, "" for tool/ itself."""
+    parts = name.split("/")
+    return parts[1] if len(parts) > 2 else ""
+
+
+def tool_complaint(source, target):
+    """Why a file of the tool may not include another, or None."""
+    folder, to_folder = tool_folder(source), tool_folder(target)
+    for name in (folder, to_folder):
+        if name not in TOOL_LEVEL:
+            return f"tool/{name}/ is no layer of the tool: name it in scripts/check_includes.py"
+    if folder != to_folder and TOOL_LEVEL[to_folder] <= TOOL_LEVEL[folder]:
+        return f"tool/{folder} may not include tool/{to_folder}: includes run downward"
+    return None
+
+
+def tool_includes(root):
+    """The files of tool/ that each of them includes, as names from the root. A name is looked for beside the file, then in tool/."""
+    files = [f for f in sorted((root / "tool").rglob("*")) if f.suffix in (".hpp", ".cpp", ".cuh", ".cu")]
+    names = {f.relative_to(root).as_posix(): f for f in files}
+    includes = {}
+    for name, file in names.items():
+        folder = name.rpartition("/")[0]
+        found = [[f"{folder}/{t}", f"tool/{t}"] for t in INCLUDE.findall(file.read_text())]
+        includes[name] = [next(t for t in places if t in names) for places in found if any(t in names for t in places)]
+    return includes
 
 
 def find_cycle(includes):
@@ -144,7 +181,14 @@ def main():
             if why:
                 print(f"{name}: includes <{target}>: {why}")
                 failed = True
-    cycle = find_cycle(includes)
+    of_tool = tool_includes(root)
+    for name, targets in of_tool.items():
+        for target in targets:
+            why = tool_complaint(name, target)
+            if why:
+                print(f"{name}: includes {target}: {why}")
+                failed = True
+    cycle = find_cycle(includes) or find_cycle(of_tool)
     if cycle:
         print("cycle of includes: " + " -> ".join(cycle))
     if not files:

@@ -13,7 +13,7 @@ model="${2:-}"
 
 need_packages "${build_packages[@]}"
 
-say "building the tool (build/demo; about a minute the first time)"
+say "building the tool (build/demo; the first time about 4 minutes on two cores)"
 [[ -f build/demo/build.ninja ]] || configure demo
 cmake --build build/demo --target voxelize demo_model -j "$jobs"
 

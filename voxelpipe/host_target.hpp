@@ -143,9 +143,9 @@ void for_each_voxel(const Host& host, F&& f) {
             for (int x = first.x; x < last.x; ++x) f(glm::ivec3(x, y, z), host(x, y, z));
 }
 
-// The same for the voxels that do not hold `empty`, the value that the target was cleared to: by default its blend's
-// identity, as framebuffers clear. A voxel whose fragments blend to that very value counts as empty. Structs need an
-// operator==.
+// Calls f(glm::ivec3 voxel, value) for the voxels that do not hold `empty`, the value that the target was cleared to:
+// by default its blend's identity, as framebuffers clear. A voxel whose fragments blend to that very value counts as
+// empty. Structs need an operator==.
 template <class Host, class F>
 void for_each_occupied(const Host& host, F&& f,
                        const typename Host::value_type& empty = Host::target_type::traits::identity()) {

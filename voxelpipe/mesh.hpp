@@ -62,9 +62,9 @@ struct mesh_view {
     // Set if these triangles are some of a larger mesh's, such as those that reach a slab.
     subset part = {};
 
-    // Of all instances.
+    // Number of triangles over all instances.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_triangles() const { return triangles.size() * copies.count; }
-    // Of all instances.
+    // Number of vertices over all instances.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_vertices() const { return positions.size() * copies.count; }
     // Numbers that primitives of this draw take, of all instances: more than num_triangles() of a subset.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_primitives() const {

@@ -302,7 +302,7 @@ struct draw_triangle {
 // sizes at its construction, and refers to nothing.
 class primitive_map {
 public:
-    // Of the draws of a call.
+    // Makes the map of the draws of a call.
     template <class Mesh, class VertexShader, class FragmentShader>
     explicit primitive_map(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws) {
         std::uint64_t end = 0;

@@ -67,7 +67,7 @@ struct counters {
     std::uint64_t fragments_discarded = 0; // by the fragment shader
     std::uint64_t voxels = 0;              // with at least one fragment; 0 if counting was switched off
 
-    // Of either kind.
+    // Number of triangles dropped for either reason.
     [[nodiscard]] std::uint64_t triangles_dropped() const { return triangles_nonfinite + triangles_too_far; }
     friend bool operator==(const counters&, const counters&) = default;
 };
@@ -78,12 +78,11 @@ struct flood_counters {
     // a hole's lid (repair::close_holes) than the closing, or than 1, do not count. 0: nothing is amiss.
     std::uint64_t lost_voxels = 0;
     std::uint64_t enclosed_voxels = 0; // those that the flood left and no triangle touches
-    // Of lost voxels only. Voxels that closed rows and the holes' lids have inside, and a flood around mesh and lids
-    // took all the same: it came in where the mesh leaves the grid, and would not take them in a grid that holds the
-    // mesh.
+    // Number of lost voxels that closed rows and the holes' lids have inside, and a flood around mesh and lids took all
+    // the same: it came in where the mesh leaves the grid, and would not take them in a grid that holds the mesh.
     std::uint64_t face_voxels = 0;
-    // Of lost voxels only. Holes of the mesh, components of the edges that no opposite edge cancels, by which the flood
-    // came in: it took voxels between their edges.
+    // Number of the holes of the mesh, components of the edges that no opposite edge cancels, by which the flood came
+    // in: it took voxels between their edges.
     std::uint64_t entered_holes = 0;
     std::uint32_t hole_width = 0; // of the widest of them, in voxels, rounded up; of a slit its narrow side
     // The least solid_options::closing, of those that were tried, whose flood keeps what the holes' lids enclose; 0:

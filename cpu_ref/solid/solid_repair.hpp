@@ -167,7 +167,7 @@ private:
     return beams;
 }
 
-// The same for a slab of which a flood of the whole grid has decided all voxels.
+// The interior of a slab, all of whose voxels a flood of the whole grid has decided.
 [[nodiscard]] inline std::vector<beam_words> take_interior(const execution& how, const solid_geometry& s,
                                                            const solid_slab& slab) {
     const stopwatch watch(how.times, &stage_times::fine_raster);

@@ -120,7 +120,7 @@ public:
         }
     }
 
-    // The same for tiles of earlier contents that reach into this one.
+    // Takes over the values of tiles of earlier contents that reach into this one.
     template <class Contents>
     void take_over_tiles(const Contents& from, std::uint64_t tile_key) {
         const std::uint64_t first = tile_key * tile_bricks;

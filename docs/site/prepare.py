@@ -22,8 +22,7 @@ SITE = ROOT / "docs" / "site"
 PAGES = {
     "docs/guide.md": "guide", "docs/tool.md": "tool", "docs/scale.md": "scale", "python/README.md": "python", "docs/gallery/README.md": "gallery/index",
     "docs/design.md": "design", "docs/pipeline.md": "pipeline", "docs/performance.md": "performance", "docs/optimizations.md": "optimizations",
-    "docs/performance_computed.md": "performance_computed", "docs/performance_solids.md": "performance_solids",
-    "docs/performance_sparse.md": "performance_sparse", "docs/performance_light.md": "performance_light",
+    "docs/performance_tables.md": "performance_tables",
     "docs/rejected.md": "rejected", "docs/contributing.md": "contributing", "docs/extending.md": "extending", "docs/release.md": "release", "packaging/README.md": "packaging",
     "CHANGELOG.md": "changelog", "README.md": "index",
 }

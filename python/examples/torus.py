@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""The example of the README: a torus in colours, its volume, and a picture."""
+"""A torus in colours, its volume, and a picture."""
 
 # snippet: torus
 import numpy as np

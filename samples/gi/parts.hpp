@@ -6,8 +6,8 @@
 
 #include "scene.hpp"
 
-#include "../demo_model/geometry.hpp"
-#include "../demo_model/textures.hpp"
+#include "demo_model/geometry.hpp"
+#include "demo_model/textures.hpp"
 
 #include <array>
 #include <vector>

@@ -20,7 +20,7 @@ struct work_size {
     double result_bytes = 0; // of the volume
 };
 
-// The work of a request and a model with so many triangles and bytes.
+// The work of a request for a model of that many triangles and bytes.
 [[nodiscard]] work_size work_of(const voxelize_request& request, double triangles, double model_bytes);
 
 // Time on the CPU with that many threads.

@@ -40,7 +40,7 @@ public:
         else
             copy_.push_back({backend, source});
     }
-    // The same of a list that others may hold too.
+    // Takes a list that others may hold too.
     stored(Backend& backend, const std::shared_ptr<const std::vector<T>>& source) {
         if constexpr (memory_access<Backend>::on_host)
             shared_ = source;

@@ -54,7 +54,7 @@ cuda_facts look_for_cuda() {
     switch (error) {
     case cudaSuccess:
         break;
-    case cudaErrorInsufficientDriver: // also where there is none
+    case cudaErrorInsufficientDriver: // also without any driver
         facts.driver_too_old = facts.driver != 0;
         break;
     case cudaErrorNoDevice:

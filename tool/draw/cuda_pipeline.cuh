@@ -4,7 +4,8 @@
 // The tool's pipeline for cuda_backend: how it reads targets, and which file compiles which of its parts. nvcc takes
 // minutes for all kernels of the pipeline, so each part that draws is instantiated in a file of its own.
 
-#include "pipeline.hpp"
+#include "pipeline_solid.hpp"
+#include "pipeline_surface.hpp"
 
 #include <voxelpipe/device/surface_calls.cuh>
 

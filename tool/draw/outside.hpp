@@ -18,7 +18,7 @@
 
 namespace voxelize {
 
-// The first and the last occupied voxel of a column; no voxel is both if there is none.
+// The first and the last occupied voxel of a column; of an empty column, first > last.
 struct column_ends {
     std::int32_t first = INT32_MAX, last = -1;
 
@@ -63,7 +63,7 @@ struct column_table {
     }
 };
 
-// Of a whole volume. LOW: its first voxel in the whole grid. BITS is a bit channel of V.
+// The columns of a whole volume. LOW: its first voxel in the whole grid. BITS is a bit channel of V.
 [[nodiscard]] column_table columns_of(const volume& v, const channel& bits, const glm::ivec3& low, int threads);
 
 } // namespace voxelize

@@ -4,7 +4,7 @@
 
 // What slabs of one model give a pass over all of them (sparse/slab_passes.hpp), kept as files beside the slabs, so
 // that no other process and no later run has to find it again. A file is there as a whole or not at all, and one whose
-// length or checksum is not its own is none.
+// length or checksum is wrong counts as missing.
 
 #include <cstddef>
 #include <filesystem>

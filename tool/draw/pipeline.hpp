@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The tool's pipeline, a template over the backend: instantiated for cpu_backend in voxelizer.cpp and for cuda_backend
-// in cuda_*.cu (cuda_pipeline.cuh). Takes a scene, uploads it, draws every slab of the grid into a framebuffer of all
-// wanted targets and resolves it into the volume. A solid is drawn after its surface, and the voxels inside are filled
-// on the host.
+// in cuda_*.cu (cuda_pipeline.cuh), which also include pipeline_solid.hpp and pipeline_surface.hpp. Takes a scene,
+// uploads it, draws every slab of the grid into a framebuffer of all wanted targets and resolves it into the volume. A
+// solid is drawn after its surface, and the voxels inside are filled on the host.
 
 #include "backend_memory.hpp"
 #include "model/parallel.hpp"
@@ -417,6 +417,3 @@ protected: // sparse_pipeline draws the same into bricks
 };
 
 } // namespace voxelize
-
-#include "pipeline_solid.hpp"   // IWYU pragma: export
-#include "pipeline_surface.hpp" // IWYU pragma: export

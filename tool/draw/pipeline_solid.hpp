@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Solids in the tool's pipeline: their bits, slab by slab, and the values of the voxels inside. Part of pipeline.hpp,
-// which includes it.
+// Solids in the tool's pipeline: their bits, slab by slab, and the values of the voxels inside. Part of pipeline.hpp:
+// a file that instantiates the pipeline includes it.
 
 #include "model/memory.hpp"
 #include "model/placement.hpp"

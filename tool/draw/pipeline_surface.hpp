@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The surface in the tool's pipeline: one slab with all its targets, and the colours that the sides of the grid see.
-// Part of pipeline.hpp, which includes it.
+// Part of pipeline.hpp: a file that instantiates the pipeline includes it.
 
 #include "model/parallel.hpp"
 #include "pipeline.hpp"

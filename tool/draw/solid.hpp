@@ -49,7 +49,7 @@ using fill_means = std::array<std::array<std::uint8_t, 4>, target_table.size()>;
 struct solid_request {
     solid_rule rule = solid_rule::nonzero;
     solid_extent extent = solid_extent::outer;
-    // Lids on holes of at most so many edges; 0: on none. Not with exterior and vote.
+    // The most edges of a hole that gets a lid; 0: no hole gets one. Not with exterior and vote.
     std::uint64_t close_holes = 0;
     bool vote = false; // most of the parities along x, y and z, whatever the rule; the extent is outer
     int closing = 0;   // exterior: gaps of about twice as many voxels are closed
@@ -60,7 +60,7 @@ struct solid_request {
     bool is_whole = false; // the whole model is drawn in the whole grid at once, so that it can be examined
     // sRGB of the voxels inside; none: the mean of the model's covered voxels, in linear light, by alpha.
     std::optional<std::array<std::uint8_t, 3>> fill_color;
-    // Of a slab: the means of the whole grid, not owned. Null: the slab is all there is.
+    // For a slab, the means of the whole grid, not owned. Null: the slab is the whole grid.
     const fill_means* means = nullptr;
 };
 
@@ -82,8 +82,8 @@ struct solid_counts {
 // where there are none, or the rule does without closed models.
 [[nodiscard]] std::string open_warning(const solid_request& request, const solid_counts& counts);
 
-// One line where a flood leaves nothing but the surface, of so many voxels in all, or has taken voxels of the inside;
-// empty elsewhere.
+// One line if a flood leaves nothing but the surface, whose number of voxels is `voxels`, or has taken voxels of the
+// inside; otherwise empty.
 [[nodiscard]] std::string flood_warning(const solid_request& request, const solid_counts& counts, std::uint64_t voxels);
 
 // The mean of colours, in linear light, weighted by alpha, opaque; clay where none of them shows. Sums of integers, so

@@ -5,7 +5,8 @@
 #include "backend_estimate.hpp"
 #include "cuda_device.hpp"
 #include "padding.hpp"
-#include "pipeline.hpp"
+#include "pipeline_solid.hpp"
+#include "pipeline_surface.hpp"
 
 #include <cpu_ref/backend.hpp>
 

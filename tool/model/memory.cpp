@@ -66,7 +66,7 @@ void measure_overhead() noexcept {
     if (limit_bytes != UINT64_MAX) allowed = difference(limit_bytes, rest + reserve);
 }
 
-// The number in FILE; the greatest where there is none ("max").
+// The number in FILE; the greatest number if FILE holds none ("max").
 std::uint64_t number_in(const std::string& file) {
     std::ifstream stream(file);
     std::uint64_t number = 0;

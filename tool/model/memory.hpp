@@ -44,7 +44,8 @@ void set_limit(std::uint64_t limit, bool is_option);
 // without being counted.
 [[nodiscard]] bool take(std::size_t bytes) noexcept;
 void give_back(std::size_t bytes) noexcept;
-// The same for small blocks of BYTES together, which are not counted: false where the process is past the limit.
+// For operator new: small blocks of BYTES together have been taken, which are not counted. False if the process is past
+// the limit.
 [[nodiscard]] bool take_small(std::size_t bytes) noexcept;
 // For operator new: the system had no BYTES more.
 void refused(std::size_t bytes) noexcept;
@@ -53,7 +54,7 @@ void refused(std::size_t bytes) noexcept;
 // come to, more or less, to be named. HINT follows the figures.
 void require(double bytes, const std::string& what, const std::string& hint = "", double likely = 0);
 
-// The run will come to so many BYTES more than are held now, about: later shortages name that much.
+// The run will need about BYTES more than are held now: later shortages name that need.
 void expect(double bytes);
 
 // The message for a std::bad_alloc: the need as far as it is known, LIKELY in all where that is more, and the limit.

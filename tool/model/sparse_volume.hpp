@@ -71,8 +71,8 @@ struct sparse_volume {
 // Copies values of a part's channel: `count` of them from number `first` on.
 using slab_reader =
     std::function<void(std::size_t part, std::size_t channel, std::uint64_t first, std::uint64_t count, std::byte* to)>;
-// The same for parts whose channels hold no data. Each value is read once, or a few times if it is a tile's; those of a
-// part's channel ascend.
+// One volume of parts whose channels hold no data: `read` copies their values. Each value is read once, or a few times
+// if it is a tile's; those of a part's channel ascend.
 [[nodiscard]] sparse_volume join_slabs(std::vector<sparse_volume>&& parts, const slab_reader& read);
 
 // The same volume, in which those of `keys`, ascending, that lie in tiles are bricks; without keys, all bricks of

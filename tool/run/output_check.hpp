@@ -34,7 +34,7 @@ public:
     // The run reads the file, whether or not it is there. what: as a message calls it, "the model". Throws
     // output_conflict.
     void add_input(const std::filesystem::path& file, const std::string& what);
-    // The same for a file that the model names, which a message calls a texture of the model, or what else it is.
+    // The run reads a file that the model names. A message calls it a texture of the model, or what else it is.
     void add_named(const std::filesystem::path& file, const std::filesystem::path& model);
     // The run writes these files for an output. is_known: some of them may have been added before. Throws
     // output_conflict.

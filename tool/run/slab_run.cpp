@@ -97,7 +97,7 @@ public:
         std::error_code error;
         return fs::exists(path_, error);
     }
-    // Of these slabs of this process, those that have to be drawn; the folder stays until they are. None if another
+    // Returns the slabs of `share` that have to be drawn; the folder stays until they are. The list is empty if another
     // process makes the output meanwhile.
     [[nodiscard]] std::vector<std::int64_t> begin(const std::vector<std::int64_t>& share) const {
         std::error_code error;

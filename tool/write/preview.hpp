@@ -64,7 +64,7 @@ struct image {
 };
 
 // The channel that gives voxels their colour: "color", or else the first that starts so (color_max, ...); u8 with three
-// or four components. Null when there is none.
+// or four components. Null without such a channel.
 [[nodiscard]] const channel* find_colors(const volume& v);
 [[nodiscard]] const channel* find_colors(std::span<const channel> channels);
 

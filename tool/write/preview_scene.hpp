@@ -117,7 +117,7 @@ private:
     }
     void add_row_ends(std::uint32_t brick, std::vector<std::int32_t>& first, std::vector<std::int32_t>& last) const;
     [[nodiscard]] int3 brick_position(std::uint32_t brick) const;
-    // The number in bricks_ of a voxel's brick, of a sparse grid; far_off: there is none within 64^3 voxels.
+    // The number in bricks_ of a voxel's brick, of a sparse grid; far_off: no brick lies within 64^3 voxels.
     [[nodiscard]] std::uint32_t number_of(const int3& cell, bool& far_off) const {
         const std::uint32_t node = nodes_[flag_index(coarse_size_, cell[0] >> 6, cell[1] >> 6, cell[2] >> 6)];
         far_off = node == 0;
@@ -132,7 +132,7 @@ private:
     [[nodiscard]] ray_hit walk(const vec3& origin, const vec3& direction, double limit) const;
     void measure_distances(int threads);
 
-    // First and last occupied voxel of a row; first > last when there is none.
+    // First and last occupied voxel of a row; first > last for an empty row.
     [[nodiscard]] std::array<std::int32_t, 2> row_ends(std::int32_t j, std::int32_t k) const;
     [[nodiscard]] std::uint32_t window(std::int32_t i, std::int32_t j, std::int32_t k) const;
     void look_at_layer(const volume& v, const channel& bits, std::int32_t layer, int3& low, int3& high);

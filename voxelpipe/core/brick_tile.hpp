@@ -56,7 +56,7 @@ namespace core {
                                                                 std::uint64_t key) {
     return bisect(count, [=](std::uint64_t i) { return tiles[i].first() <= key; });
 }
-// The number of the tile that has the brick with this key; `count` if there is none.
+// The number of the tile that has the brick with this key; `count` if no tile has it.
 [[nodiscard]] VOXELPIPE_HD inline std::uint64_t find_tile(const brick_tile* tiles, std::uint64_t count,
                                                           std::uint64_t key) {
     const std::uint64_t first = num_tiles_up_to(tiles, count, key);

@@ -156,8 +156,8 @@ struct row_axes {
     [[nodiscard]] VOXELPIPE_HD constexpr bool are_along_x() const { return dominant == (along_v ? 1 : 2); }
 };
 
-// The same for thin coverage, in rows of 16 columns of the dominant axis. For triangles with an area. Here and in
-// brick_row, u is the axis along the rows.
+// A large triangle in bricks for thin coverage, in rows of 16 columns of the dominant axis. For triangles with an area.
+// Here and in brick_row, u is the axis along the rows.
 struct brick_thin {
     brick_half_plane uv[3];
     std::int64_t nu, nv, nw, depth; // as in small_thin

@@ -156,7 +156,7 @@ inline constexpr std::uint32_t lower_x = 0x55555555u, lower_y = 0x33333333u, low
     return {cube_of(last) & ~fold_bytes(out), sure};
 }
 
-// The same for a box that is one voxel wide along at least one axis: one projection.
+// Covered voxels of a box that is one voxel wide along at least one axis: one projection decides them.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE sure_bits quad_bits_by_signs(const std::int32_t (&q)[3][3],
                                                                          const std::int32_t (&lo)[3],
                                                                          const int (&last)[3], int fraction) {

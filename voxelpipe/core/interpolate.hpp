@@ -195,7 +195,7 @@ template <class Int>
     return {weight(t.p[1], t.p[2]), weight(t.p[2], t.p[0]), weight(t.p[0], t.p[1])};
 }
 
-// The same for a small triangle; (u, v) is relative to the lowest voxel of its bounding box, and lies in that box.
+// Barycentrics of a small triangle; (u, v) is relative to the lowest voxel of its bounding box, and lies in that box.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE glm::vec3 barycentric(const small_frame& t, int u, int v) {
     if (t.zero_area) return glm::vec3(1.0f / 3.0f);
     const std::int32_t x = (2 * u + 1) << t.fraction, y = (2 * v + 1) << t.fraction;

@@ -46,7 +46,7 @@ struct alignas(16) octree_block {
     [[nodiscard]] VOXELPIPE_HD std::uint64_t before_word(unsigned w) const {
         return before + (parts >> (part_bits * ((w - 1) & 7u)) & 511u); // of word 0: the highest bit, which is 0
     }
-    // Says that so many children of the block lie before word w, 1 to 7. Once for each.
+    // Sets the number of children of the block before word w, 1 to 7. Called once for each word.
     VOXELPIPE_HD void set_part(unsigned w, std::uint64_t children) { parts |= children << (part_bits * (w - 1)); }
     friend bool operator==(const octree_block&, const octree_block&) = default;
 };
@@ -75,9 +75,9 @@ struct octree_level_view {
         return tiles[core::bisect(num_tiles, [this, n](std::uint64_t i) { return tiles[i].node < n; })].rank;
     }
 
-    // Words of the masks of so many nodes.
+    // Number of words of the masks of `nodes` nodes.
     [[nodiscard]] VOXELPIPE_HD static constexpr std::uint64_t num_words(std::uint64_t nodes) { return (nodes + 7) / 8; }
-    // Blocks of so many nodes.
+    // Number of blocks of `nodes` nodes.
     [[nodiscard]] VOXELPIPE_HD static constexpr std::uint64_t num_blocks(std::uint64_t nodes) {
         return (nodes + 63) / 64;
     }
@@ -90,7 +90,7 @@ private:
 struct octree_view {
     static constexpr int max_levels = 21; // enough for 2^20 voxels an axis
 
-    int num_levels = 0;                     // the root is level num_levels; there is none where no voxel exists
+    int num_levels = 0;                     // the root is level num_levels; 0 if no voxel exists
     octree_level_view levels[max_levels]{}; // level l at [l - 1]
 
     // The first voxel along origin + t * direction, 0 <= t <= limit, in continuous voxel coordinates of the whole grid,

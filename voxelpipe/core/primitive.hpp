@@ -83,8 +83,9 @@ VOXELPIPE_HD void for_each_tile_in(const snapped_position& a, const snapped_posi
     VOXELPIPE_CALLS_ANY_END
 }
 
-// The same for all of the triangle's `reach` (voxels). A triangle within one tile needs no test, nor does one whose
-// bounding box is a line of tiles (is_line_of_voxels). Inlined, because most triangles lie in one tile.
+// Calls emit(tile) for each tile of the triangle's `reach` (voxels) in which it has work. A triangle within one tile
+// needs no test, nor does one whose bounding box is a line of tiles (is_line_of_voxels). Inlined, because most
+// triangles lie in one tile.
 VOXELPIPE_ANY_CALLABLE
 template <coverage Rule, class Emit>
 VOXELPIPE_HD VOXELPIPE_INLINE void for_each_tile(const snapped_position& a, const snapped_position& b,

@@ -186,8 +186,8 @@ template <int Limbs>
            (m.negative ? sign : 0);
 }
 
-// The same for float, usually by one conversion: if the sum fits 64 bits and has no marks. Its last place is a normal
-// float, so the product is exact.
+// The sum rounded to float, usually by one conversion: if the sum fits 64 bits and has no marks. Its last place is a
+// normal float, so the product is exact.
 template <int Log2Quantum>
 [[nodiscard]] VOXELPIPE_HD inline float round_sum_to_float(const wide_sum<1>& s) {
     static_assert(Log2Quantum >= -126 && Log2Quantum <= 64);

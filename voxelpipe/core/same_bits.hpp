@@ -21,7 +21,7 @@ template <class T>
     return std::bit_cast<bytes>(a) == std::bit_cast<bytes>(b);
 }
 
-// The same for each value of two packs. Padding between the values does not matter.
+// True if the values of two packs have the same bits, one by one. Padding between the values does not matter.
 template <class... Ts>
 [[nodiscard]] constexpr bool has_same_bits(const pack<Ts...>& a, const pack<Ts...>& b) {
     bool same = true;

@@ -205,7 +205,8 @@ struct small_conservative {
         }
     };
 
-    // The same for a box of at most 16 voxels a side, all of it at once. `limits` holds 16 words: get(i), set(i, word).
+    // Emits the rows of a box of at most 16 voxels a side, found all at once. `limits` holds 16 words: get(i), set(i,
+    // word).
     template <bool Clips, class Limits, class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void rows_of_16(const small_box& box, Limits&& limits, Emit&& emit) const {
         if (box.empty()) return;
@@ -253,7 +254,7 @@ struct small_conservative {
             first_z_ += 4;
             return true;
         }
-        // Advances to the next row; true if there is none.
+        // Advances to the next row; true after the last one.
         [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE bool is_done() {
             while (!is_here())
                 if (!advance()) return true;
@@ -274,7 +275,7 @@ struct small_conservative {
         std::uint64_t met_[4] = {}; // rows, bit y + 16 z, from first_z on
     };
 
-    // The same for boxes of up to 32 voxels a side.
+    // Emits the rows of a box of up to 32 voxels a side.
     template <class Emit>
     VOXELPIPE_HD VOXELPIPE_INLINE void long_rows(const small_box& box, Emit&& emit) const {
         const int x0 = box.lo[0], x1 = box.hi[0];

@@ -7,6 +7,7 @@
 #include <voxelpipe/abuffer.hpp>
 #include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/device/call/abuffer_call.cuh>
+#include <voxelpipe/device/call/kernel_instances.cuh>
 #include <voxelpipe/device/call/kernels.cuh>
 #include <voxelpipe/device/call/list_arrays.cuh>
 #include <voxelpipe/device/scene/subset.cuh>
@@ -22,7 +23,7 @@
 namespace voxelpipe {
 
 // Outside the class, and so not inline: a unit that links voxelpipe::cuda_kernels does not compile the calls that the
-// library holds (device/call/kernels.cuh).
+// library holds (device/call/kernel_instances.cuh).
 template <class Selector, class Mesh, class VertexShader, class FragmentShader, class... Targets, class Coverage>
 status cuda_backend::run(std::span<const draw<Mesh, VertexShader, FragmentShader>> draws, const grid& g,
                          const framebuffer_view<Targets...>& fb, const voxelize_options& options,

@@ -7,6 +7,7 @@
 // leaves every target as it was, and read_status reports what was needed.
 
 #include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/device/call/kernel_instances.cuh>
 #include <voxelpipe/device/scene/subset.cuh>
 #include <voxelpipe/tuning/tuning_strategy.hpp>
 

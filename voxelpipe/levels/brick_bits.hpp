@@ -27,7 +27,7 @@ struct brick_bits_view {
     [[nodiscard]] VOXELPIPE_HD static glm::ivec3 num_bricks(const glm::ivec3& extent) {
         return {(extent.x + 3) >> 2, (extent.y + 3) >> 2, (extent.z + 3) >> 2};
     }
-    // The word of a cell, in words for so many cells.
+    // The number of a cell's word among those of a grid of `extent` cells.
     [[nodiscard]] VOXELPIPE_HD static std::size_t word_of(const glm::ivec3& v, const glm::ivec3& extent) {
         const glm::ivec3 n = num_bricks(extent);
         const auto wide = [](int i) { return static_cast<std::size_t>(i); };

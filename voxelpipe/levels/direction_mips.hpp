@@ -128,7 +128,7 @@ struct direction_mips_view {
     int last_level = 0;                     // the level of one voxel
     std::uint64_t first[22] = {}; // number of values of `coarse` before a level; the last entry is that of them all
 
-    // Of a level.
+    // Number of voxels of a level.
     [[nodiscard]] VOXELPIPE_HD std::size_t num_voxels(int level) const {
         const glm::ivec3 e = mip_extent(extent, level);
         return static_cast<std::size_t>(e.x) * static_cast<std::size_t>(e.y) * static_cast<std::size_t>(e.z);

@@ -51,7 +51,7 @@ class patch_point {
 public:
     using vertex_type = vertex_output<Varyings>; // what the vertex shader returns
 
-    // Of the point, before the program displaces it.
+    // Position of the point, before the program displaces it.
     [[nodiscard]] VOXELPIPE_HD glm::vec3 position() const { return mix_of(a_.position, b_.position, c_.position); }
     // All varyings, interpolated; flat ones from one vertex.
     [[nodiscard]] VOXELPIPE_HD Varyings varyings() const {
@@ -116,13 +116,13 @@ struct triangle {
     vertex_output<Varyings> vertices[3];  // counter-clockwise from the front
     std::uint32_t number, instance, draw; // number: of the triangle in its mesh; of the patch after a tessellation
 };
-// The same for a segment of lines_view.
+// What a geometry program gets of a segment of lines_view.
 template <class Varyings = no_varyings>
 struct line {
     vertex_output<Varyings> vertices[2];  // in the order of the indices
     std::uint32_t number, instance, draw; // number: of the segment in its view
 };
-// The same for a point of points_view.
+// What a geometry program gets of a point of points_view.
 template <class Varyings = no_varyings>
 struct point {
     vertex_output<Varyings> vertices[1];  // one

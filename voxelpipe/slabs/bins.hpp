@@ -150,7 +150,7 @@ public:
         join_last_pieces();
         return out;
     }
-    // Copies the records from `first` on; there are so many.
+    // Copies as many records as `to` holds, from `first` on; all of them exist.
     void copy(std::uint64_t first, std::span<Record> to) const {
         auto from = std::upper_bound(pieces_.begin(), pieces_.end(), first,
                                      [](std::uint64_t record, const piece& p) { return record < p.end; });

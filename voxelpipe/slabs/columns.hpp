@@ -121,7 +121,7 @@ private:
 // triangles tell what lies below the next one.
 class column_sweep {
 public:
-    // Of a grid, or of a crop of one: its columns begin at its lowest layer.
+    // Sweeps a grid, or a crop of one: the columns begin at its lowest layer.
     explicit column_sweep(const grid& g)
         : columns_(g), open_(columns_.words()), below_(columns_.words()), next_(columns_.words()) {}
 

@@ -77,7 +77,7 @@ public:
         if (!s.ok()) inside_.clear();
         return s;
     }
-    // Of slab i, for solid_slab::inside.
+    // The bits of slab i, for solid_slab::inside.
     [[nodiscard]] const std::uint64_t* inside(std::size_t i) const { return inside_[i]->data(); }
 
 private:

@@ -113,9 +113,9 @@ public:
             return voxelize(gpu, draws, g, out, options_.voxelize);
         });
     }
-    // The same for solids, if device_options::is_solid: voxels, counts and counts of rows are those of one call.
-    // how.repair is that of device_options; how.cones and how.slab are found here, and not given. What a repair takes,
-    // and holds as long as the object lives:
+    // Draws solids, if device_options::is_solid: voxels, counts and counts of rows are those of one call. how.repair is
+    // that of device_options; how.cones and how.slab are found here, and not given. What a repair takes, and holds as
+    // long as the object lives:
     //   close_holes   the constructor copies all vertices to host memory, 24 bytes each, where one thread goes through
     //                 all triangles, in 24 bytes each; holds about 100 bytes a boundary edge there
     //   vote          the same copy, and all threads; holds a layer of bits of the grid for each slab, and one more

@@ -32,7 +32,7 @@ public:
     // temporary file. threads: at least 1.
     slab_exterior(glm::ivec3 extent, int closing, std::uint64_t budget, std::string folder, unsigned threads)
         : slab_exterior(extent, closing, budget, std::move(folder), threads, {0, extent.z}) {}
-    // The same for a part of the grid, not empty: its layers [begin, end) along z.
+    // Floods for a part of the grid, not empty: its layers [begin, end) along z.
     slab_exterior(glm::ivec3 extent, int closing, std::uint64_t budget, std::string folder, unsigned threads,
                   layer_range part)
         : extent_(extent), padded_(extent + 2 * (closing + 1)), closing_(closing), threads_(threads),

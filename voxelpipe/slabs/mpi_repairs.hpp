@@ -19,8 +19,8 @@
 
 namespace voxelpipe::slabs::detail {
 
-// The cones of the whole mesh, from the edges that are left on each rank; `finder` is none afterwards. They are of no
-// use if a rank has failed. Every rank.
+// The cones of the whole mesh, from the edges that are left on each rank; `finder` is empty afterwards. The cones are
+// of no use if a rank has failed. Every rank calls it.
 [[nodiscard]] inline core::hole_cones join_holes(const ranks& all, std::optional<hole_finder>& finder,
                                                  std::uint64_t max_hole_edges, shared_work& work) {
     using edge = hole_finder::edge;

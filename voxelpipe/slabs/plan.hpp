@@ -261,9 +261,9 @@ struct classified {
     return t;
 }
 
-// The same for voxelize_solid with repair::vote, in slabs along z: rows along all axes count, so that a triangle beside
-// the grid does that meets two of its intervals. Where it misses that of z, it is drawn, and its reach is empty: no
-// slab needs it.
+// Classifies a triangle as voxelize_solid with repair::vote needs it, in slabs along z: rows along all axes count, so
+// that a triangle beside the grid does that meets two of its intervals. Where it misses that of z, it is drawn, and its
+// reach is empty: no slab needs it.
 [[nodiscard]] VOXELPIPE_HD inline classified classify_for_vote(const core::snap_transform& snap,
                                                                const glm::ivec3& extent, const glm::vec3& a,
                                                                const glm::vec3& b, const glm::vec3& c) {

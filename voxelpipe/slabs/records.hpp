@@ -63,7 +63,7 @@ struct numbered_shader {
         return shader(f);
     }
 };
-// The same for the lists that a slab gave. Triangles keep their order, so that lists stay sorted.
+// Gives the lists of a slab the numbers of the whole mesh. Triangles keep their order, so that lists stay sorted.
 struct renumber_list {
     std::uint32_t* primitives;
     const std::uint32_t* numbers;

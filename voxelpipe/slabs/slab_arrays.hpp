@@ -27,7 +27,7 @@ struct slab_arrays {
     core::raw_array<glm::vec3> positions;
     core::raw_array<glm::uvec3> triangles;
     core::raw_array<std::uint32_t> numbers; // in the whole mesh, by triangle
-    core::raw_array<Varyings> varyings;     // none where they are empty
+    core::raw_array<Varyings> varyings;     // no elements if Varyings is empty
 
     slab_arrays() = default;
     // Reads the bin by threads. Throws std::bad_alloc, and std::system_error of its file.

@@ -129,7 +129,7 @@ public:
         has_walls_ = true;
         return draw_walls();
     }
-    // Of stream_options::repair.
+    // What stream_options::repair has found.
     [[nodiscard]] solid_repairs& repairs() { return repairs_; }
     // Threads that work on the host.
     [[nodiscard]] unsigned threads() const { return threads_; }
@@ -147,8 +147,8 @@ public:
         return with_sink(sink,
                          [&](const auto& to) { return draw_slabs<false>(shader, make, to, solid_options{}, 0.75); });
     }
-    // The same for solids: the voxels, the counts and the counts of rows of one call with the whole mesh, which is one
-    // draw. Slabs are along y or z, with vote and exterior along z. how.repair is that of stream_options; how.cones and
+    // Draws solids: the voxels, the counts and the counts of rows of one call with the whole mesh, which is one draw.
+    // Slabs are along y or z, with vote and exterior along z. how.repair is that of stream_options; how.cones and
     // how.slab are found by the stream, and not given. Held beside the budget:
     //   close_holes   the boundaries of the holes and their cones, about 100 bytes a boundary edge, and a slab's call
     //                 its own copy of the cones

@@ -13,7 +13,7 @@
 
 namespace voxelpipe::slabs {
 
-// Of slabs::stream and slabs::mpi_stream.
+// Options of slabs::stream and slabs::mpi_stream.
 struct stream_options {
     voxelize_options voxelize = {}; // of each slab's call
     // Bytes for binned triangles, a slab's mesh and its targets, and what a repair finds of all slabs, together. Lists

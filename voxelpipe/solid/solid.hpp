@@ -132,7 +132,7 @@ template <class Mesh, class VertexShader, class SolidShader, class Payload>
 // Names the calls of this module: a backend implements voxelize_solid as run_module(solid_tag, backend, draws, grid,
 // framebuffer_view or A-buffer, options, number of triangles), which argument-dependent lookup finds by the tag.
 struct solid_tag {};
-// The same for diagnose_repair: draws, grid, bodies. Gives the lids on all holes of each body.
+// The tag of diagnose_repair, whose arguments are draws, grid and bodies. Gives the lids on all holes of each body.
 struct find_holes_tag {};
 
 // True if a backend's calls take solid_options::slab.

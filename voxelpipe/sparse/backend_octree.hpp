@@ -27,15 +27,15 @@ public:
     template <class T>
     using buffer = typename Backend::template buffer<T>;
 
-    // Of bricks and tiles in memory of the backend, up to the least root that holds the whole grid; no level where no
-    // voxel exists. Fewer than 2^32 - 1 bricks; throws std::length_error otherwise, and what a buffer throws. Waits
-    // once a level, and once.
+    // Makes the octree of bricks and tiles in memory of the backend, up to the least root that holds the whole grid; no
+    // level where no voxel exists. Fewer than 2^32 - 1 bricks; throws std::length_error otherwise, and what a buffer
+    // throws. Waits once a level, and once.
     backend_octree(Backend& backend, const brick_table& table, const glm::ivec3& whole_extent)
         : blocks_(backend, std::size_t{0}) {
         if (table.count >= max_bricks) throw std::length_error("voxelpipe: an octree takes fewer than 2^32 - 1 bricks");
         if (table.count != 0 || table.num_tiles != 0) build(backend, table, whole_extent);
     }
-    // Of what the framebuffer holds now.
+    // Makes the octree of what the framebuffer holds now.
     template <class... Targets>
     backend_octree(Backend& backend, const sparse_framebuffer<Backend, Targets...>& fb)
         : backend_octree(backend, fb.view().table, fb.where().whole_extent()) {}
@@ -98,7 +98,7 @@ private:
         [[nodiscard]] core::mask_bytes bytes() { return {masks.data(), count}; }
     };
 
-    // Of all nodes of levels_[l].
+    // Number of children of all nodes of levels_[l].
     [[nodiscard]] std::uint64_t num_children(std::size_t l) const {
         return l == 0 ? num_in_bricks_ : levels_[l - 1].count;
     }

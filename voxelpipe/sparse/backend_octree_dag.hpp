@@ -21,7 +21,7 @@ namespace voxelpipe {
 namespace core {
 
 // The nodes of a level of an octree, each with what its children have become. As one number, the mask is on top and the
-// children follow, the first one first, `width` bits each and 0 where there is none.
+// children follow, the first one first, `width` bits each and 0 for a missing child.
 struct dag_level {
     octree_level_view nodes;
     const std::uint32_t* below; // null on level 1
@@ -133,8 +133,9 @@ public:
     template <class T>
     using buffer = typename Backend::template buffer<T>;
 
-    // Of fewer than 2^32 - 1 nodes a level; throws std::length_error otherwise, and what a buffer throws. Beside the
-    // result it takes about 40 bytes for each node of the octree's largest level. Waits twice a level.
+    // Makes the graph of an octree of fewer than 2^32 - 1 nodes a level; throws std::length_error otherwise, and what a
+    // buffer throws. Beside the result it takes about 40 bytes for each node of the octree's largest level. Waits twice
+    // a level.
     backend_octree_dag(Backend& backend, const backend_octree<Backend>& tree) {
         buffer<std::uint32_t> below(backend, std::size_t{0});
         for (int l = 1; l <= tree.num_levels(); ++l) below = add_level(backend, tree, l, below);

@@ -37,7 +37,7 @@ struct brick_lookup {
         return key * 0x9e3779b97f4a7c15u >> (64 - log2_slots);
     }
 
-    // The number of the brick with this key; brick_table::none where it does not exist.
+    // The number of the brick with this key; brick_table::none if it does not exist.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t find_brick(const brick_table& table, std::uint64_t key) const {
         const std::uint64_t last = (std::uint64_t{1} << log2_slots) - 1;
         for (std::uint64_t at = first_slot(key, log2_slots);; at = (at + 1) & last) {

@@ -174,7 +174,7 @@ template <class... Targets>
     return out;
 }
 
-// The same for any number of parts, at least one; each voxel is copied about log2(parts) times.
+// Merges any number of parts, at least one; each voxel is copied about log2(parts) times.
 template <class... Targets>
 [[nodiscard]] host_sparse<Targets...> merge(std::span<const host_sparse<Targets...>> parts) {
     if (parts.empty()) throw std::invalid_argument("voxelpipe::merge: no parts");

@@ -16,7 +16,7 @@ namespace voxelpipe::tuning {
 // The raster is launched once per draw. Calls of more draws go through tiles, whose launches take all draws.
 inline constexpr std::size_t max_raster_draws = 16;
 
-// A raster without tiles draws many instances in passes of at most so many triangles, or of one instance, in some 25
+// A raster without tiles draws many instances in passes of at most max_pass_triangles, or of one instance, in some 25
 // bytes a triangle and 40 a vertex. In grids whose triangles may have so much work that it could not be numbered,
 // passes are smaller, down to the minimum. 10^6 instances of 980 triangles into bits at 1024^3, in passes of 2^21,
 // 2^22, 2^23 and 2^24 triangles: 64.9, 49.4, 40.3 and 34.3 ms (H200).

@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# cmake -DMODE=fails|control -DCOMPILER=... -DINCLUDES=a|b -DPRELUDE=file.hpp -DSOURCE=file.cpp -P check.cmake
-# cmake -DMODE=prelude ... precompiles PRELUDE, with which the others then start.
+# cmake -DMODE=fails -DCASE=name -DCOMPILER=... -DINCLUDES=a|b -DPRELUDE=file.hpp -DSOURCE=cases.cpp -P check.cmake
+# cmake -DMODE=control ... compiles all cases corrected. cmake -DMODE=prelude ... precompiles PRELUDE, with which the
+# others then start.
 cmake_minimum_required(VERSION 3.24)
 
 string(REPLACE "|" ";" includes "${INCLUDES}")
@@ -21,7 +22,7 @@ if(MODE STREQUAL "prelude")
 endif()
 
 if(MODE STREQUAL "control")
-  execute_process(COMMAND "${COMPILER}" -std=c++20 -fsyntax-only ${includes} -DVOXELPIPE_CONTROL -include "${PRELUDE}" "${SOURCE}"
+  execute_process(COMMAND "${COMPILER}" -std=c++20 -fsyntax-only ${includes} -DALL=1 -include "${PRELUDE}" "${SOURCE}"
                   RESULT_VARIABLE result ERROR_VARIABLE output)
   if(NOT result EQUAL 0)
     message(FATAL_ERROR "the corrected programs have to compile, but:\n${output}")
@@ -29,24 +30,23 @@ if(MODE STREQUAL "control")
   return()
 endif()
 
-file(STRINGS "${SOURCE}" header LIMIT_COUNT 12)
-set(expected "")
+# The case's lines: its message behind the #if, then comments.
+file(READ "${SOURCE}" text)
+if(NOT text MATCHES "\n#if CASE_${CASE} [^\n]*// ([^\n]+)\n((// (max-errors|flags): [^\n]*\n)*)")
+  message(FATAL_ERROR "${SOURCE} has no line `#if CASE_${CASE} || ALL // REGEX`")
+endif()
+set(expected "${CMAKE_MATCH_1}")
+set(comments "${CMAKE_MATCH_2}")
 set(max_errors 1)
+if(comments MATCHES "// max-errors: ([0-9]+)")
+  set(max_errors ${CMAKE_MATCH_1})
+endif()
 set(flags "")
-foreach(line IN LISTS header)
-  if(line MATCHES "^// expect: (.+)$")
-    set(expected "${CMAKE_MATCH_1}")
-  elseif(line MATCHES "^// max-errors: ([0-9]+)")
-    set(max_errors ${CMAKE_MATCH_1})
-  elseif(line MATCHES "^// flags: (.+)$")
-    separate_arguments(flags UNIX_COMMAND "${CMAKE_MATCH_1}")
-  endif()
-endforeach()
-if(expected STREQUAL "")
-  message(FATAL_ERROR "${SOURCE} has no line `// expect: REGEX`")
+if(comments MATCHES "// flags: ([^\n]+)")
+  separate_arguments(flags UNIX_COMMAND "${CMAKE_MATCH_1}")
 endif()
 
-set(command "${COMPILER}" -std=c++20 -fsyntax-only -fno-diagnostics-color ${includes} ${flags})
+set(command "${COMPILER}" -std=c++20 -fsyntax-only -fno-diagnostics-color ${includes} ${flags} -DCASE_${CASE}=1)
 # Other flags make a precompiled header useless, and clang refuse it.
 if(flags STREQUAL "")
   list(APPEND command -include "${PRELUDE}")

@@ -24,7 +24,7 @@ public:
     void add_line(const glm::dvec3& a, const glm::dvec3& b);
 
     [[nodiscard]] double voxels() const { return voxels_; }
-    // Of each layer that the part has, lowest first.
+    // The voxels of each layer of the part, lowest first.
     [[nodiscard]] const std::vector<double>& layers() const { return layers_; }
     // The signed volume that the triangles enclose, in voxels.
     [[nodiscard]] double volume() const { return volume_; }
@@ -66,14 +66,14 @@ inline constexpr double drawn_brick_bytes = 160;
 [[nodiscard]] int counted_side(const surface_layers& surface);
 // The grid of such cubes that covers a part.
 [[nodiscard]] voxelpipe::grid counted_grid(const voxelpipe::grid& part, int side);
-// The bricks and voxels of so many cubes that the surface touches.
+// The bricks and voxels of the touched cubes of the surface.
 [[nodiscard]] brick_counts counts_of(const surface_layers& surface, const brick_counts& touched, int side);
 
 // Throws memory_error where the bricks of a streamed surface cannot fit once they are drawn: nothing of it has been
 // counted, so half of them have to.
 void require_streamed(const voxelize_request& request, const surface_layers& surface);
 
-// Throws memory_error where so many bytes do not fit; a shortage later in the run names them.
+// Throws memory_error if `bytes` do not fit; a shortage later in the run names that need.
 void require_bricks(const voxelize_request& request, double bytes);
 
 } // namespace voxelize

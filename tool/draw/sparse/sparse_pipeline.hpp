@@ -9,7 +9,8 @@
 
 #include "brick_count.hpp"
 #include "brick_need.hpp"
-#include "draw/pipeline.hpp"
+#include "draw/pipeline_solid.hpp"
+#include "draw/pipeline_surface.hpp"
 #include "model/memory.hpp"
 #include "model/sparse_volume.hpp"
 #include "sparse_outside.hpp"
@@ -90,7 +91,7 @@ private:
             if (this->request_.progress) this->request_.progress((pass + begin + done * (end - begin)) / passes);
         };
     }
-    // The surface as the first passes of so many.
+    // The surface, which is drawn by the first of `passes` passes.
     [[nodiscard]] sparse_volume surface_in(const voxelpipe::grid& whole, int passes) {
         sparse_volume result;
         result.shape = volume_of(whole);
@@ -131,13 +132,13 @@ private:
                                 side == 1 && !request.solid ? request.coverage : voxelpipe::coverage::conservative);
         if (counted) require_bricks(request, needed_bytes(request, surface, counts_of(surface, *counted, side), bytes));
     }
-    // As many slabs as keep within the working memory with so many bytes a voxel; one that would not is halved, down to
-    // a tile's height. Their borders are borders of bricks. draw(slab, most) returns false, without having done
+    // As many slabs as keep within the working memory at `bytes_of_voxel` a voxel; a slab that does not is halved, down
+    // to a tile's height. Their borders are borders of bricks. draw(slab, most) returns false, without having done
     // anything, if it has more than `most`. Returns the number of slabs.
     template <class Draw>
     int draw_within(double bytes_of_voxel, int pass, int passes, const Draw& draw) {
         const voxelpipe::grid all = this->uploaded_->relative_grid();
-        // Of what the slabs before have left.
+        // The share of the memory that earlier slabs have left.
         const auto work = [this] {
             return this->request_.work_memory != 0 ? static_cast<double>(this->request_.work_memory)
                                                    : static_cast<double>(memory::room()) / 4;

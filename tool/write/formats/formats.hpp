@@ -99,8 +99,8 @@ enum class held_as : std::uint8_t { grid, list, unknown };
 // Throws write_error if what is at `path` was not written by this tool and must not be replaced: a folder of .zarr.
 void check_replaceable(const std::filesystem::path& path);
 
-// The same of occupied voxels and their colours (voxel_shape.hpp), for formats that show those alone: all but .npy,
-// .npz, .vti, .pvti, .nrrd, .zarr, .png, .html, .nvdb and .vdb.
+// Writes occupied voxels and their colours (voxel_shape.hpp), for formats that show those alone: all but .npy, .npz,
+// .vti, .pvti, .nrrd, .zarr, .png, .html, .nvdb and .vdb.
 class voxel_shape;
 std::vector<std::filesystem::path> write(const voxel_shape& v, const std::filesystem::path& path,
                                          const write_options& options);

@@ -53,7 +53,7 @@ void write_items(output_file& out, std::size_t count, int threads, progress_mete
     }
 }
 
-// The files that a mesh of so many faces becomes, and what each holds.
+// A file of a mesh, and the faces that it holds.
 struct mesh_part {
     std::filesystem::path path;
     std::span<const voxel_face> faces;

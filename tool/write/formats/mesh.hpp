@@ -28,7 +28,8 @@ std::vector<std::filesystem::path> write_obj(const voxel_shape& v, const std::fi
                                              const write_options& options);
 std::vector<std::filesystem::path> write_glb(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options);
-// The names of the three above: a mesh is split only if the grid's voxels can have so many faces.
+// The names of the files of the three functions above. A mesh is split only if the voxels of the grid can have more
+// faces than a file holds.
 [[nodiscard]] written_names mesh_names(const volume& shape, const std::filesystem::path& path,
                                        const write_options& options, held_as held);
 std::vector<std::filesystem::path> write_xyz(const voxel_shape& v, const std::filesystem::path& path,

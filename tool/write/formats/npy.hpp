@@ -13,7 +13,7 @@ namespace voxelize {
 
 // Everything that stands before the values, padded so that they start at a multiple of 64 bytes. Also used by .npz.
 [[nodiscard]] std::string npy_header(const volume& v, const channel& c);
-// The same for any array; `shape` as Python writes a tuple.
+// The header of any array; `shape` as Python writes a tuple.
 [[nodiscard]] std::string npy_header(scalar type, const std::string& shape);
 
 // One file a channel: PATH itself for a single one, PATH with ".CHANNEL" before the extension for several.

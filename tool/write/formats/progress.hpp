@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Turns "so many bytes done" into the fraction that write_options::progress wants, at most 200 calls a file.
+// Turns the number of bytes done into the fraction that write_options::progress wants, at most 200 calls a file.
 
 #include <algorithm>
 #include <cstdint>

@@ -112,7 +112,7 @@ public:
     [[nodiscard]] std::span<const placed> layer(std::size_t n) const {
         return std::span{bricks_}.subspan(begin_[n], begin_[n + 1] - begin_[n]);
     }
-    // The bricks of the layer that lies at `at` along the axis; none where that is empty.
+    // The bricks of the layer that lies at `at` along the axis; an empty span for an empty layer.
     [[nodiscard]] std::span<const placed> layer_at(int at) const;
     // Those of them that lie at `row`.
     [[nodiscard]] static std::span<const placed> row_of(std::span<const placed> layer, int row);

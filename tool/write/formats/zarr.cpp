@@ -38,7 +38,7 @@ public:
     [[nodiscard]] std::int64_t num_shards() const { return array_layout::product(file_.layout().shards); }
     // Shards of a layer.
     [[nodiscard]] std::int64_t shards_of_slab() const { return file_.layout().shards[1] * file_.layout().shards[2]; }
-    // Chunks of so many shards.
+    // Number of chunks of `shards` shards.
     [[nodiscard]] std::int64_t chunks_of(std::int64_t shards) const {
         return shards * array_layout::product(file_.layout().per_shard);
     }

@@ -91,8 +91,8 @@ struct abuffer_call<draw<Mesh, VertexShader, FragmentShader>, Payload> {
     }
 
 private:
-    // True if fragments may be sorted by counting: voxels are not known to have so many fragments that atomics wait for
-    // each other, nor so few that counting gains nothing.
+    // True if fragments may be sorted by counting: no voxel is known to have more fragments than atomics serve well,
+    // nor do all have too few for counting to gain.
     [[nodiscard]] bool may_count() const {
         return !has_few_a_voxel && (limits.longest_ordered <= tuning::max_of_block || limits.longest_ordered == ~0ull);
     }
@@ -164,7 +164,8 @@ private:
         }
     };
 
-    // The same for any other shader, which runs on the sorted lists; with `filters`, also before the sort.
+    // The lists of one draw with any other shader, which runs on the sorted lists; with `filters`, also before the
+    // sort.
     struct shaded_lists {
         static constexpr bool has_payload = !std::is_same_v<Payload, no_payload>;
         const abuffer_call& call;

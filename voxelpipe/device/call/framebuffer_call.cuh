@@ -14,6 +14,7 @@
 #include <voxelpipe/device/call/strategy.hpp>
 #include <voxelpipe/device/call/tiled_strategy.cuh>
 #include <voxelpipe/device/raster/raster_draws.cuh>
+#include <voxelpipe/voxelize.hpp>
 
 #include <algorithm>
 #include <cstdint>
@@ -180,7 +181,7 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
         for (const draw_type& d : draws) most = std::max<std::size_t>(most, d.mesh.num_triangles());
         return most;
     }
-    // Triangles of a pass over some instances: fewer if the work items of so many could not be numbered.
+    // Triangles of a pass over some instances: fewer if their work items could not be numbered.
     [[nodiscard]] std::uint64_t pass_triangles() const {
         std::uint64_t most = tuning::max_pass_triangles;
         while (most > tuning::min_pass_triangles &&

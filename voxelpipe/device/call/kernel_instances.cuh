@@ -10,6 +10,7 @@
 
 #include <voxelpipe/device/call/abuffer_call.cuh>
 #include <voxelpipe/device/call/framebuffer_call.cuh>
+#include <voxelpipe/voxelize.hpp>
 
 #include <cstdint>
 
@@ -89,3 +90,12 @@
 #define VOXELPIPE_LIST_CALLS(HOW) VOXELPIPE_CALLS(HOW, bool, VOXELPIPE_LISTS)
 #define VOXELPIPE_BIT_ASYNC_CALLS(HOW) VOXELPIPE_ASYNC_CALLS(HOW, bool, VOXELPIPE_BITS)
 #define VOXELPIPE_SUM_ASYNC_CALLS(HOW) VOXELPIPE_ASYNC_CALLS(HOW, float, VOXELPIPE_SUMS)
+
+#if defined(VOXELPIPE_LINKS_CUDA_KERNELS)
+namespace voxelpipe::device {
+VOXELPIPE_VERTEX_SHADES(extern template)
+VOXELPIPE_LIST_RASTERS(extern template)
+VOXELPIPE_MASK_RASTERS(extern template)
+VOXELPIPE_CLEARS(extern template)
+} // namespace voxelpipe::device
+#endif

@@ -17,13 +17,4 @@
 #include <voxelpipe/device/scene/prefix_sum_kernels.cuh>
 #include <voxelpipe/device/scene/subset_kernels.cuh>
 #include <voxelpipe/device/tiles/tile_passes_kernels.cuh>
-#else
-#include <voxelpipe/device/call/kernel_instances.cuh>
-
-namespace voxelpipe::device {
-VOXELPIPE_VERTEX_SHADES(extern template)
-VOXELPIPE_LIST_RASTERS(extern template)
-VOXELPIPE_MASK_RASTERS(extern template)
-VOXELPIPE_CLEARS(extern template)
-} // namespace voxelpipe::device
 #endif

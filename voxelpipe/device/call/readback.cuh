@@ -55,7 +55,7 @@ public:
         if (may_lock && was_used_ && page_ == nullptr) lock();
         was_used_ = true;
     }
-    // The page's address on the device; null if there is none.
+    // The page's address on the device; null without a page.
     [[nodiscard]] void* page() const { return on_device_; }
     // Call before the launches of a call that ends with `send`.
     void expect() {

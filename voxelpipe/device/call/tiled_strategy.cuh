@@ -13,6 +13,7 @@
 #include <voxelpipe/device/targets/tracked_clear.cuh>
 #include <voxelpipe/device/tiles/tile_passes.cuh>
 #include <voxelpipe/tuning/tuning_fragments.hpp>
+#include <voxelpipe/voxelize.hpp>
 
 #include <cstdint>
 #include <optional>

@@ -161,7 +161,7 @@ void fold_lists(const fragment_lists<Key, Values>& lists, const Framebuffer& fb,
     launch_fold(lists, fb, count_voxels, state, limits, targets, stream);
     end_stage(clock, &stage_times::fine_raster);
 }
-// The same for the targets that are not drawn in tiles.
+// Folds lists into the targets that are not drawn in tiles.
 template <class Key, class Values, class Framebuffer>
 void fold_ordered(const fragment_lists<Key, Values>& lists, const Framebuffer& fb, bool count_voxels,
                   pipeline_state* state, const capacities& limits, cudaStream_t stream, stage_clock* clock = nullptr) {

@@ -8,6 +8,7 @@
 // just the bits in use follows, and each voxel's first fragment is selected. Fragments listed in any order are ordered
 // within each voxel on the way (fragments/order_voxels.cuh), and shaded then. Memory is proportional to the fragments.
 
+#include <voxelpipe/abuffer.hpp>
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/fragments/counting_sort.cuh>
 #include <voxelpipe/device/fragments/list_sink.cuh>
@@ -111,12 +112,6 @@ struct list_buffers {
     void* storage;
     std::size_t storage_bytes;
 };
-
-// True if up to `capacity` keys of this type are sorted by fragments/radix_sort.cuh; otherwise by scene/key_sort.cuh.
-template <class Key>
-[[nodiscard]] VOXELPIPE_HD constexpr bool are_sorted_here(std::uint64_t capacity) {
-    return sizeof(Key) == sizeof(std::uint32_t) && capacity < max_sorted;
-}
 
 // Arrays for counting and writing fragments.
 struct list_memory {
@@ -233,7 +228,7 @@ sort_lists(const list_buffers<Key, Payload>& b, const output_pointers& outputs, 
     return lists;
 }
 
-// The same for primitives listed in any order, and writes the lists to the output pointers. The raster has run the
+// Sorts primitives listed in any order by voxel, and writes the lists to the output pointers. The raster has run the
 // preparation, except for fillers. spare: room for limits.fragments if the sorted voxels are needed afterwards;
 // otherwise null.
 template <class Payload>

@@ -86,7 +86,7 @@ struct listing_sink : sink_base<Call> {
             __syncwarp();
         }
     }
-    // The same for up to 31 fragments per lane, distributed over all lanes: of(lane, i) is the voxel of a lane's
+    // Writes up to 31 fragments per lane to the list, distributed over all lanes: of(lane, i) is the voxel of a lane's
     // fragment i. All lanes call it.
     template <class Of>
     __device__ VOXELPIPE_INLINE void distribute(std::uint32_t count, Of&& of) {
@@ -285,7 +285,7 @@ struct list_output {
     }
 };
 
-// True if the raster without tiles serves a draw, whose triangles have at most so many work items.
+// True if the raster without tiles serves a draw, whose triangles have at most `most_work_items` work items each.
 [[nodiscard]] inline bool is_rastered(std::uint64_t num_triangles, int fraction, glm::ivec3 extent,
                                       std::uint64_t most_work_items) {
     return core::small_voxels(fraction) > 0 && std::max({extent.x, extent.y, extent.z}) <= max_immediate_extent &&

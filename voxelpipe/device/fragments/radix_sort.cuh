@@ -25,7 +25,13 @@ namespace voxelpipe::device {
 inline constexpr int max_digit_passes = 4;
 inline constexpr std::uint64_t max_sorted = std::uint64_t{1} << 30; // pairs: two bits of a tile's words are flags
 
-// How keys of so many bits are divided into digits, lowest first: as few as possible, all of one size.
+// True if up to `capacity` keys of this type are sorted by fragments/radix_sort.cuh; otherwise by scene/key_sort.cuh.
+template <class Key>
+[[nodiscard]] VOXELPIPE_HD constexpr bool are_sorted_here(std::uint64_t capacity) {
+    return sizeof(Key) == sizeof(std::uint32_t) && capacity < max_sorted;
+}
+
+// How the bits of keys are divided into digits, lowest first: as few as possible, all of one size.
 struct digit_plan {
     int passes, bits; // bits of a digit
 

@@ -7,6 +7,7 @@
 
 #include <voxelpipe/device/base/call_state.cuh>
 #include <voxelpipe/device/base/launch.cuh>
+#include <voxelpipe/device/base/warp.cuh>
 #include <voxelpipe/device/raster/size_class.cuh>
 
 #include <algorithm>

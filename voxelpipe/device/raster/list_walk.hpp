@@ -16,7 +16,7 @@ template <int Lists>
 class list_walk {
 public:
     struct chunk {
-        int list; // negative if there is none
+        int list; // negative after the last one
         std::uint32_t number;
     };
 

@@ -4,7 +4,7 @@
 
 // Size classes of triangles: what a triangle costs, and who draws it.
 
-#include <voxelpipe/device/scene/triangle_source.cuh>
+#include <voxelpipe/device/scene/int32_triangle.cuh>
 #include <voxelpipe/tuning/tuning_raster.hpp>
 
 namespace voxelpipe::device {

@@ -118,7 +118,7 @@ __device__ VOXELPIPE_INLINE bool raster_thin(const raster_input<Source>& call, c
     return true;
 }
 
-// The same for a warp that passes fragments in rounds, to a sink that needs their number first. All lanes call it.
+// Emits the thin fragments of a warp's triangles in rounds, to a sink that needs their number first. All lanes call it.
 // Returns false, with nothing done, if the number cannot be known.
 template <class Source, class Kept, class Sink>
 [[nodiscard]] __device__ VOXELPIPE_INLINE bool raster_thin_by_rounds(const raster_input<Source>& call,

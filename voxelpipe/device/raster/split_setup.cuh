@@ -5,10 +5,12 @@
 // Splits large triangles into work items, and sets them up: once each if they have many work items, otherwise for every
 // work item (raster/split_triangles.cuh draws them).
 
+#include <voxelpipe/core/brick_triangle.hpp>
+#include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/device/base/relaxed_access.cuh>
 #include <voxelpipe/device/raster/deferred_triangles.cuh>
-#include <voxelpipe/device/raster/small_triangles.cuh>
 #include <voxelpipe/device/scene/count_and_emit.cuh>
+#include <voxelpipe/device/scene/triangle_source.cuh>
 
 #include <algorithm>
 #include <cstdint>

@@ -12,7 +12,9 @@
 #include <voxelpipe/device/base/launch.cuh>
 #include <voxelpipe/device/base/memory.cuh>
 #include <voxelpipe/device/base/warp.cuh>
-#include <voxelpipe/voxelize.hpp>
+#include <voxelpipe/grid.hpp>
+#include <voxelpipe/mesh.hpp>
+#include <voxelpipe/shader.hpp>
 
 #include <cstddef>
 #include <cstdint>

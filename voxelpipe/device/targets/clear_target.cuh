@@ -5,6 +5,7 @@
 // Clears render targets, including padding (padding bits become 0). Writes nothing if the call has failed.
 
 #include <voxelpipe/device/scene/scene.cuh>
+#include <voxelpipe/framebuffer.hpp>
 #include <voxelpipe/tuning/tuning_raster.hpp>
 
 #include <algorithm>

@@ -68,7 +68,7 @@ struct tile_image {
             tile[i] = 0;
     }
 
-    // Blends one fragment into voxel i of the tile. The winner plane holds primitive + 1; 0 is none.
+    // Blends one fragment into voxel i of the tile. The winner plane holds primitive + 1, and 0 without a winner.
     template <class Values>
     __device__ VOXELPIPE_INLINE static void blend(word* tile, int i, std::uint32_t primitive, const Values& values,
                                                   bool track) {

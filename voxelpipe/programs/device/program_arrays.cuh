@@ -6,8 +6,9 @@
 // programs/device/patches.cuh launch. Nothing here waits; what is counted stays on the device.
 
 #include <voxelpipe/device/base/for_each.cuh>
+#include <voxelpipe/device/fragments/store_lists.cuh>
 #include <voxelpipe/device/scene/prefix_sum.cuh>
-#include <voxelpipe/programs/device/async_output.cuh>
+#include <voxelpipe/device/voxelize_async.cuh>
 #include <voxelpipe/programs/passes/types.hpp>
 
 #include <cstddef>
@@ -83,7 +84,7 @@ struct make_lattice_room {
         if (!fits) state->stop = stopped;
     }
 };
-// The same for the triangles of draw number `draw`, which come last.
+// Decides whether the triangles of draw number `draw` fit, which come last.
 struct make_room {
     const unsigned long long* triangles;
     std::uint64_t capacity;

@@ -7,6 +7,7 @@
 // whose other triangles lie outside of the grid. If it has no room for all, or a program has failed, no target is
 // written, and read_status says what was needed.
 
+#include <voxelpipe/programs/device/async_output.cuh>
 #include <voxelpipe/programs/device/program_arrays.cuh>
 
 #include <algorithm>

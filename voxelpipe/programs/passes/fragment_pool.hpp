@@ -171,8 +171,8 @@ class fragment_pool {
     using buffer = typename Backend::template buffer<T>;
 
 public:
-    // Room for `count` fragments, to be written in any order: their voxel, or num_voxels if there is none; their number
-    // in the part; primitive; payload. Parts come by ascending primitive. Within a part, fragments of a voxel stand by
+    // Room for `count` fragments, to be written in any order: their voxel, or num_voxels without one; their number in
+    // the part; primitive; payload. Parts come by ascending primitive. Within a part, fragments of a voxel stand by
     // ascending primitive.
     struct part {
         part(Backend& backend, std::uint64_t count)

@@ -15,7 +15,7 @@ struct geometry_inputs {
     const vertex_output<V>* vertices;
     element_indices<K> in;
     std::uint64_t count;
-    // Of a tessellation: the patch of each triangle, and how many patches an instance has. Otherwise null and 0.
+    // After a tessellation, the patch of each triangle and the number of patches of an instance. Otherwise null and 0.
     const std::uint32_t* origins;
     std::uint32_t patches_each;
     std::uint32_t draw;

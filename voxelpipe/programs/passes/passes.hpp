@@ -86,7 +86,7 @@ public:
                   has_origins ? m.origins.data() : nullptr);
         return m;
     }
-    // The same for a geometry program. Triangles that are left out have indices beyond all vertices.
+    // The mesh that a geometry program makes. Triangles that are left out have indices beyond all vertices.
     struct joined {
         buffer<vertex_output<W>> vertices;
         buffer<glm::uvec3> triangles;

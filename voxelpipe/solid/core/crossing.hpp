@@ -47,7 +47,7 @@ struct centre_offset {
     }
 };
 
-// Indices from lo to hi; none where hi < lo.
+// Indices from lo to hi; the span is empty if hi < lo.
 struct index_span {
     std::int64_t lo, hi;
     [[nodiscard]] VOXELPIPE_HD constexpr bool empty() const { return hi < lo; }

@@ -53,7 +53,8 @@ public:
         std::uint64_t from, to;
     };
 
-    // Two passes over the same edges: count all, then start(), then add all. An edge from a vertex to itself is none.
+    // Two passes over the same edges: count all, then start(), then add all. An edge from a vertex to itself does not
+    // count.
     void count(std::uint64_t from, std::uint64_t to) {
         if (from != to) ++first_[std::min(from, to) + 1];
     }

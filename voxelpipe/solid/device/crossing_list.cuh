@@ -7,7 +7,6 @@
 // entries of a row fix its voxels in whatever order they are listed, so they are appended by atomics and sorted by key
 // alone.
 
-#include <voxelpipe/device/fragments/fragment_lists.cuh>
 #include <voxelpipe/device/fragments/radix_sort.cuh>
 #include <voxelpipe/device/scene/key_sort.cuh>
 #include <voxelpipe/tuning/tuning_solid.hpp>

@@ -43,8 +43,8 @@ struct voting_triangle {
     core::snapped_position p[3];
     std::int32_t u_lo, u_hi, v_lo;
 };
-// The triangles of a block. Their lines are numbered through, and each thread takes every so many of them: most
-// triangles have one or two, and a few of a room's walls have a thousand.
+// The triangles of a block. Their lines are numbered through, and the threads take them in turn: most triangles have
+// one or two, and a few of a room's walls have a thousand.
 struct voting_triangles {
     block_scan<std::uint32_t, threads_per_block> scan;
     std::uint32_t first_line[threads_per_block];

@@ -23,7 +23,8 @@ namespace voxelpipe::device {
     return l.bricks <= core::max_numbered - spare_cells && l.nodes < std::uint64_t{1} << 25 &&
            l.fragments <= core::max_numbered && l.voxels < std::uint64_t{1} << 40;
 }
-// The same for a result. Where voxels stay, ranks have 32 bits, and so have the words of masks and the parts of tiles.
+// True if the bricks of a result are numbered with 32 bits. Where voxels stay, ranks have 32 bits, and so have the
+// words of masks and the parts of tiles.
 template <class... Targets>
 [[nodiscard]] bool are_numbered_bricks(const workspace_limits& l, const sparse_result<Targets...>& result) {
     if (!are_numbered_bricks(l)) return false;

@@ -41,7 +41,8 @@ struct brick_arrays {
     std::uint64_t* keys;
     brick_mask* masks;
     std::uint64_t* offsets; // one more than bricks
-    // Of each voxel, by rank: its number in the list, its rank before; or no_source. existing: null if nothing stays.
+    // For each voxel, by rank, its number in the list and its rank before; or no_source. existing: null if nothing
+    // stays.
     std::uint32_t *listed, *existing;
 };
 

@@ -56,7 +56,7 @@ public:
                                : deferred_triangles::take_lists(memory, triangles_);
     }
     // True if mark and set_masks may read setups of large triangles: where they draw voxel by voxel in the deferred
-    // pass, or so many bricks that their work items are worth it.
+    // pass, or have enough bricks for their work items to pay.
     template <coverage Rule>
     [[nodiscard]] bool reads_setups() const {
         const glm::ivec3 whole = g_.whole_extent();

@@ -158,7 +158,7 @@ struct mask_drawer {
     unsigned fragments = 0;
     int waiting = 0;
 
-    // Queues the pair of each lane that meets its triangle, and draws 32 of them if so many wait. All lanes call it.
+    // Queues the pair of each lane that meets its triangle, and draws 32 of them as soon as 32 wait. All lanes call it.
     __device__ VOXELPIPE_INLINE void push(bool wanted, const mask_pair& p) {
         if (wanted) {
             const auto& s = mask_setup_of<Large>(memory, p.slot);

@@ -60,8 +60,8 @@ struct sparse_result {
         start = {earlier.view, earlier.where};
         loads.fill(load_operation::load);
     }
-    // The same of a sparse framebuffer, which no call may change until the stream has passed this one. A target that it
-    // keeps no values of has to be cleared.
+    // Makes the next call go on from a sparse framebuffer, which no call may change until the stream has passed this
+    // one. A target that it keeps no values of has to be cleared.
     void load(const sparse_framebuffer<cuda_backend, Targets...>& earlier) {
         start = {earlier.view(), earlier.where()};
         loads.fill(load_operation::load);
