@@ -143,12 +143,12 @@ struct distance_at_tag {};
 }
 
 [[nodiscard]] inline status validate(const distance_options& o, const grid& g) {
+    if (!are_measurable(g.voxel_size)) return failure(status_code::bad_voxel_size);
     const float b = band_distance(o.band, g);
     const bool has_band = o.band.is_whole || (std::isfinite(o.band.voxels) && o.band.voxels > 0.0 && b > 0.0f &&
                                               b < std::numeric_limits<float>::infinity());
     if (!has_band || o.sample > sample::corner || o.sign > distance_sign::none)
         return failure(status_code::bad_distance_options);
-    if (!are_measurable(g.voxel_size)) return failure(status_code::bad_voxel_size);
     if (o.sign == distance_sign::none) {
         constexpr distance_options plain;
         const bool is_plain = o.rule == plain.rule && o.bodies == plain.bodies && o.repair == plain.repair &&
