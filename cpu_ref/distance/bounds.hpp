@@ -14,6 +14,10 @@
 #include <cstdint>
 #include <limits>
 
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
 namespace voxelpipe::cpu {
 
 struct lane_points {
@@ -79,49 +83,123 @@ struct local_triangle {
     return r;
 }
 
+// Four floats side by side: SSE2 registers where the compiler has them.
+#if defined(__SSE2__)
+struct four {
+    __m128 v;
+    [[nodiscard]] static four all(float a) { return {_mm_set1_ps(a)}; }
+    [[nodiscard]] static four load(const float* p) { return {_mm_loadu_ps(p)}; }
+    void store(float* p) const { _mm_storeu_ps(p, v); }
+    friend four operator+(four a, four b) { return {_mm_add_ps(a.v, b.v)}; }
+    friend four operator-(four a, four b) { return {_mm_sub_ps(a.v, b.v)}; }
+    friend four operator*(four a, four b) { return {_mm_mul_ps(a.v, b.v)}; }
+    friend four operator/(four a, four b) { return {_mm_div_ps(a.v, b.v)}; }
+    friend four operator<(four a, four b) { return {_mm_cmplt_ps(a.v, b.v)}; } // a mask
+    friend four operator&(four a, four b) { return {_mm_and_ps(a.v, b.v)}; }   // of masks
+    [[nodiscard]] static four select(four mask, four yes, four no) {
+        return {_mm_or_ps(_mm_and_ps(mask.v, yes.v), _mm_andnot_ps(mask.v, no.v))};
+    }
+    // Both give the second argument where one is NaN.
+    [[nodiscard]] static four min(four a, four b) { return {_mm_min_ps(a.v, b.v)}; }
+    [[nodiscard]] static four max(four a, four b) { return {_mm_max_ps(a.v, b.v)}; }
+    [[nodiscard]] static four root(four a) { return {_mm_sqrt_ps(a.v)}; }
+    [[nodiscard]] static unsigned bits(four mask) { return static_cast<unsigned>(_mm_movemask_ps(mask.v)); }
+};
+#else
+struct four {
+    std::array<float, 4> v;
+    template <class F>
+    [[nodiscard]] static four of(const F& f) {
+        return {{f(0), f(1), f(2), f(3)}};
+    }
+    [[nodiscard]] static four all(float a) { return {{a, a, a, a}}; }
+    [[nodiscard]] static four load(const float* p) { return {{p[0], p[1], p[2], p[3]}}; }
+    void store(float* p) const { std::copy(v.begin(), v.end(), p); }
+    friend four operator+(const four& a, const four& b) {
+        return of([&](std::size_t i) { return a.v[i] + b.v[i]; });
+    }
+    friend four operator-(const four& a, const four& b) {
+        return of([&](std::size_t i) { return a.v[i] - b.v[i]; });
+    }
+    friend four operator*(const four& a, const four& b) {
+        return of([&](std::size_t i) { return a.v[i] * b.v[i]; });
+    }
+    friend four operator/(const four& a, const four& b) {
+        return of([&](std::size_t i) { return a.v[i] / b.v[i]; });
+    }
+    friend four operator<(const four& a, const four& b) { // a mask: 1 or 0
+        return of([&](std::size_t i) { return a.v[i] < b.v[i] ? 1.0f : 0.0f; });
+    }
+    friend four operator&(const four& a, const four& b) { return a * b; } // of masks
+    [[nodiscard]] static four select(const four& mask, const four& yes, const four& no) {
+        return of([&](std::size_t i) { return mask.v[i] != 0.0f ? yes.v[i] : no.v[i]; });
+    }
+    // Both give the second argument where one is NaN.
+    [[nodiscard]] static four min(const four& a, const four& b) {
+        return of([&](std::size_t i) { return a.v[i] < b.v[i] ? a.v[i] : b.v[i]; });
+    }
+    [[nodiscard]] static four max(const four& a, const four& b) {
+        return of([&](std::size_t i) { return a.v[i] > b.v[i] ? a.v[i] : b.v[i]; });
+    }
+    [[nodiscard]] static four root(const four& a) {
+        return of([&](std::size_t i) { return std::sqrt(a.v[i]); });
+    }
+    [[nodiscard]] static unsigned bits(const four& mask) {
+        unsigned r = 0;
+        for (std::size_t i = 0; i < 4; ++i) r |= static_cast<unsigned>(mask.v[i] != 0.0f) << i;
+        return r;
+    }
+};
+#endif
+
 // Bounds from the ball.
 VOXELPIPE_INLINE void ball_bounds(const local_triangle& t, const lane_points& p, lane_floats& lower,
                                   lane_floats& upper) {
-    for (std::size_t l = 0; l < lanes; ++l) {
-        const float x = p.x[l] - t.middle[0], y = p.y[l] - t.middle[1], z = p.z[l] - t.middle[2];
-        const float length = std::sqrt(x * x + y * y + z * z);
-        lower[l] = length - t.radius;
-        upper[l] = length + t.radius;
+    for (std::size_t l = 0; l < lanes; l += 4) {
+        const four x = four::load(&p.x[l]) - four::all(t.middle[0]), y = four::load(&p.y[l]) - four::all(t.middle[1]),
+                   z = four::load(&p.z[l]) - four::all(t.middle[2]);
+        const four length = four::root(x * x + y * y + z * z), radius = four::all(t.radius);
+        (length - radius).store(&lower[l]);
+        (length + radius).store(&upper[l]);
     }
 }
 
 // Bounds from a point and a direction; see local_triangle.
 VOXELPIPE_INLINE void close_bounds(const local_triangle& t, const lane_points& p, lane_floats& lower,
                                    lane_floats& upper) {
-    const auto unit = [](float a) { return a > 0.0f ? a < 1.0f ? a : 1.0f : 0.0f; };
-    for (std::size_t l = 0; l < lanes; ++l) {
-        const float x = p.x[l] - t.a[0], y = p.y[l] - t.a[1], z = p.z[l] - t.a[2];
-        const float d1 = t.ab[0] * x + t.ab[1] * y + t.ab[2] * z, d2 = t.ac[0] * x + t.ac[1] * y + t.ac[2] * z;
-        const float fv = (t.d11 * d1 - t.d01 * d2) * t.inverse, fw = (t.d00 * d2 - t.d01 * d1) * t.inverse;
-        const float t0 = unit(d1 * t.i00), t1 = unit(d2 * t.i11), t2 = unit((d2 - d1 + t.d00 - t.d01) * t.i22);
-        const auto square_at = [&](float v, float w) {
-            const float qx = x - (v * t.ab[0] + w * t.ac[0]), qy = y - (v * t.ab[1] + w * t.ac[1]),
-                        qz = z - (v * t.ab[2] + w * t.ac[2]);
-            return qx * qx + qy * qy + qz * qz;
-        };
-        const float s0 = square_at(t0, 0.0f), s1 = square_at(0.0f, t1), s2 = square_at(1.0f - t2, t2);
-        float v = s1 < s0 ? 0.0f : t0, w = s1 < s0 ? t1 : 0.0f;
-        const float s01 = s1 < s0 ? s1 : s0;
-        v = s2 < s01 ? 1.0f - t2 : v;
-        w = s2 < s01 ? t2 : w;
-        const bool inside = (fv > 0.0f) & (fw > 0.0f) & (fv + fw < 1.0f);
-        v = inside ? fv : v;
-        w = inside ? fw : w;
-        const float qx = x - (v * t.ab[0] + w * t.ac[0]), qy = y - (v * t.ab[1] + w * t.ac[1]),
-                    qz = z - (v * t.ab[2] + w * t.ac[2]);
-        const float length = std::sqrt(qx * qx + qy * qy + qz * qz);
-        const float to_a = qx * x + qy * y + qz * z;
-        const float along_b = qx * t.ab[0] + qy * t.ab[1] + qz * t.ab[2];
-        const float along_c = qx * t.ac[0] + qy * t.ac[1] + qz * t.ac[2];
-        const float most = std::max(std::max(along_b, along_c), 0.0f);
-        const float least = (to_a - most) / std::max(length, 1e-18f);
-        upper[l] = length + t.error;
-        lower[l] = least - t.error;
+    const four zero = four::all(0.0f), one = four::all(1.0f);
+    const auto unit = [&](four a) { return four::min(four::max(a, zero), one); };
+    const four abx = four::all(t.ab[0]), aby = four::all(t.ab[1]), abz = four::all(t.ab[2]);
+    const four acx = four::all(t.ac[0]), acy = four::all(t.ac[1]), acz = four::all(t.ac[2]);
+    const four d00 = four::all(t.d00), d01 = four::all(t.d01), d11 = four::all(t.d11), i = four::all(t.inverse);
+    for (std::size_t l = 0; l < lanes; l += 4) {
+        const four x = four::load(&p.x[l]) - four::all(t.a[0]), y = four::load(&p.y[l]) - four::all(t.a[1]),
+                   z = four::load(&p.z[l]) - four::all(t.a[2]);
+        const four d1 = abx * x + aby * y + abz * z, d2 = acx * x + acy * y + acz * z;
+        const four fv = (d11 * d1 - d01 * d2) * i, fw = (d00 * d2 - d01 * d1) * i;
+        const four inside = (zero < fv) & (zero < fw) & (fv + fw < one);
+        four v = fv, w = fw;
+        if (four::bits(inside) != 15u) {
+            const four t0 = unit(d1 * four::all(t.i00)), t1 = unit(d2 * four::all(t.i11)),
+                       t2 = unit((d2 - d1 + d00 - d01) * four::all(t.i22)), rest = one - t2;
+            const auto square_at = [&](four m, four n) {
+                const four qx = x - (m * abx + n * acx), qy = y - (m * aby + n * acy), qz = z - (m * abz + n * acz);
+                return qx * qx + qy * qy + qz * qz;
+            };
+            const four s0 = square_at(t0, zero), s1 = square_at(zero, t1), s2 = square_at(rest, t2);
+            const four first = s1 < s0, third = s2 < four::min(s0, s1);
+            const four ev = four::select(third, rest, four::select(first, zero, t0));
+            const four ew = four::select(third, t2, four::select(first, t1, zero));
+            v = four::select(inside, fv, ev);
+            w = four::select(inside, fw, ew);
+        }
+        const four qx = x - (v * abx + w * acx), qy = y - (v * aby + w * acy), qz = z - (v * abz + w * acz);
+        const four length = four::root(qx * qx + qy * qy + qz * qz);
+        const four along_b = qx * abx + qy * aby + qz * abz, along_c = qx * acx + qy * acy + qz * acz;
+        const four along = qx * x + qy * y + qz * z - four::max(four::max(along_b, along_c), zero);
+        const four error = four::all(t.error);
+        (length + error).store(&upper[l]);
+        (along / four::max(length, four::all(1e-18f)) - error).store(&lower[l]);
     }
 }
 
