@@ -8,9 +8,11 @@
 #include "device_test.hpp"
 #include "solid_drawings.hpp"
 
-#include <voxelpipe/distance/device/distance.cuh>
+#include <voxelpipe/distance/device/distance_at.cuh>
+#include <voxelpipe/distance/device/sparse_distance.cuh>
 
-#include <cpu_ref/distance/voxelize_distance.hpp>
+#include <cpu_ref/distance/distance_at.hpp>
+#include <cpu_ref/distance/sparse_distance.hpp>
 
 #include <cstdint>
 #include <random>
@@ -51,6 +53,13 @@ struct nearest_shader {
     template <class Varyings>
     VOXELPIPE_HD vp::output<float, std::int64_t> operator()(const vp::distance_fragment<Varyings>& f) const {
         return vp::outputs(f.distance, f.in_band ? std::int64_t{f.primitive} : std::int64_t{-1});
+    }
+};
+// For sparse framebuffers, with a discard.
+struct sparse_shader {
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment& f) const {
+        return vp::outputs(f.distance, f.primitive, f.inside).discard_if(f.voxel.x % 7 == 3 && f.voxel.y % 3 == 1);
     }
 };
 // All that a fragment has, and a discard.
@@ -101,7 +110,8 @@ vp::status draw(Backend& be, const std::vector<mesh_data>& meshes, const vp::gri
     for (const auto& m : on_backend) draws.push_back({m.view(), {}, shader});
     vp::status s = vp::voxelize_distance(be, draws, g, fb, o);
     if (!s.ok() || !again) return s;
-    vp::core::for_each_index<num_targets<Framebuffer>>([&]<std::size_t I>() { vp::get<I>(fb).load(); });
+    if constexpr (requires { fb.view().targets; })
+        vp::core::for_each_index<num_targets<Framebuffer>>([&]<std::size_t I>() { vp::get<I>(fb).load(); });
     return vp::voxelize_distance(be, draws, g, fb, o);
 }
 
@@ -123,6 +133,78 @@ void expect_same(const std::vector<mesh_data>& meshes, const vp::grid& g, const 
             device_test::expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu), what.c_str());
         });
     }
+}
+
+// Everything of a sparse framebuffer, after a call and after one that loads what it left.
+inline void expect_same_bricks(const std::vector<mesh_data>& meshes, const vp::grid& g, const vp::distance_options& o) {
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    const glm::ivec3 extent = vp::core::sample_grid(g, o.sample).extent;
+    using float_target = vp::target<float, vp::blend::add>;
+    using id_target = vp::target<std::uint32_t, vp::blend::max>;
+    using bit_target = vp::target<vp::bit, vp::blend::bit_or>;
+    vp::sparse_framebuffer<vp::cpu_backend, float_target, id_target, bit_target> a(cpu, extent);
+    vp::sparse_framebuffer<vp::cuda_backend, float_target, id_target, bit_target> b(gpu, extent);
+    for (const bool again : {false, true}) {
+        const vp::status expected = draw(cpu, meshes, g, sparse_shader{}, a, o, false);
+        expect_same_status(expected, draw(gpu, meshes, g, sparse_shader{}, b, o, false));
+        ASSERT_TRUE(expected.ok()) << expected.message();
+        const auto x = a.to_host(cpu);
+        const auto y = b.to_host(gpu);
+        EXPECT_GT(x.keys.size(), 0u);
+        device_test::expect_same_bytes(x.keys, y.keys, "keys");
+        device_test::expect_same_bytes(x.masks, y.masks, "masks");
+        device_test::expect_same_bytes(x.offsets, y.offsets, "offsets");
+        vp::core::for_each_index<3>([&]<std::size_t I>() {
+            device_test::expect_same_bytes(vp::get<I>(x.values), vp::get<I>(y.values), again ? "loaded" : "cleared");
+            vp::get<I>(a).load();
+            vp::get<I>(b).load();
+        });
+    }
+}
+
+// Points in and around the grid, at vertices, not finite and far away.
+inline void expect_same_points(const std::vector<mesh_data>& meshes, const vp::grid& g, int count,
+                               const vp::distance_options& o) {
+    std::mt19937 random(17);
+    std::uniform_real_distribution<float> unit(-0.3f, 1.3f);
+    std::vector<glm::vec3> points;
+    for (int i = 0; i < count; ++i) {
+        glm::vec3 p = glm::vec3(unit(random), unit(random), unit(random)) * glm::vec3(g.extent);
+        if (i % 5 == 0) p = glm::round(p * 2.0f) * 0.5f;
+        if (i % 31 == 3) p.y = std::numeric_limits<float>::quiet_NaN();
+        if (i % 31 == 7) p.x = 1e30f;
+        if (i % 31 == 9) p *= 1000.0f;
+        points.push_back(p);
+    }
+    for (const mesh_data& m : meshes)
+        for (std::size_t i = 0; i < m.positions.size(); i += 7) points.push_back(m.positions[i]);
+    const auto run = [&](auto& be, std::vector<float>& distances, std::vector<std::int64_t>& nearest) {
+        using backend = std::remove_cvref_t<decltype(be)>;
+        std::vector<vp::mesh<backend>> on_backend;
+        for (const mesh_data& m : meshes) on_backend.emplace_back(be, m.positions, m.triangles);
+        using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, vp::distance>;
+        std::vector<draw_type> draws;
+        for (const auto& m : on_backend) draws.push_back({m.view(), {}, {}});
+        using points_view = vp::array_view<const glm::vec3>;
+        const typename backend::template buffer<glm::vec3> at(be, points_view(points.data(), points.size()));
+        typename backend::template buffer<float> d(be, points.size());
+        typename backend::template buffer<std::int64_t> n(be, points.size());
+        const vp::status s =
+            vp::distance_at(be, std::span<const draw_type>(draws), g, at.view(), {d.data(), n.data()}, o);
+        distances = d.to_host(be);
+        nearest = n.to_host(be);
+        return s;
+    };
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    std::vector<float> x, y;
+    std::vector<std::int64_t> nx, ny;
+    const vp::status expected = run(cpu, x, nx);
+    expect_same_status(expected, run(gpu, y, ny));
+    ASSERT_TRUE(expected.ok()) << expected.message();
+    device_test::expect_same_bytes(x, y, "distances");
+    device_test::expect_same_bytes(nx, ny, "nearest");
 }
 
 } // namespace distance_drawings

@@ -85,3 +85,29 @@ TEST(DeviceDistance, MeshesWithoutTriangles) {
     expect_same<one_target>({wrong}, unit_grid(glm::ivec3(9)), vp::distance{}, {.sign = vp::distance_sign::none},
                             vp::status_code::index_out_of_range);
 }
+
+// The samples of the band in bricks: cleared, loaded, in parts of a grid, and of several targets with a discard.
+TEST(DeviceDistance, SparseFramebuffersHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{43, 26, 21};
+    mesh_data bodies = device_test::tied_bodies(25, 3, 2);
+    append(bodies, device_test::ball({17, 9, 14}, 6.3f, 6));
+    const vp::grid whole = unit_grid(glm::ivec3(60, 40, 40));
+    for (const vp::grid& g : {unit_grid(extent), whole.crop({3, 5, 2}, {37, 23, 19})})
+        for (const vp::sample where : {vp::sample::centre, vp::sample::corner})
+            expect_same_bricks({bodies, device_test::ball({30, 20, 9}, 4, 4)}, g, {.band = 2, .sample = where});
+    expect_same_bricks({bodies}, unit_grid({13, 9, 10}), {.band = vp::band::whole, .sign = vp::distance_sign::none});
+}
+
+TEST(DeviceDistance, PointsHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{35, 20, 22};
+    mesh_data open = device_test::ball({12, 9, 10}, 7.3f, 6);
+    open.triangles.resize(open.triangles.size() - 9);
+    const std::vector<mesh_data> meshes{open, device_test::tied_bodies(20, 5, 2), needles(extent, 20, 3),
+                                        device_test::mixed_triangles(40, 20, 9)};
+    for (const vp::distance_options& o :
+         {vp::distance_options{}, vp::distance_options{.sign = vp::distance_sign::none},
+          vp::distance_options{.bodies = vp::bodies::draw, .repair = vp::repair::close_holes},
+          vp::distance_options{.rule = vp::fill_rule::even_odd}})
+        expect_same_points(meshes, unit_grid(extent), 300, o);
+    expect_same_points({mesh_data{}}, unit_grid(extent), 10, {});
+}

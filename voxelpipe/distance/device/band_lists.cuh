@@ -146,12 +146,13 @@ __global__ __launch_bounds__(threads_per_block) void place_triangles(const __gri
         }
     }
     if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, bad_index);
+    const bool counts = valid && !bad && i < in.num_counted;
     const auto add = [&](triangle_class which, unsigned long long* total) {
-        const int count = __syncthreads_count(static_cast<int>(valid && !bad && kind == which));
+        const int count = __syncthreads_count(static_cast<int>(counts && kind == which));
         if (threadIdx.x == 0 && count != 0) atomicAdd(total, static_cast<unsigned long long>(count));
     };
     add(triangle_class::drawn, &state->drawn);
-    if (__syncthreads_or(static_cast<int>(valid && !bad && kind != triangle_class::drawn)) == 0) return;
+    if (__syncthreads_or(static_cast<int>(counts && kind != triangle_class::drawn)) == 0) return;
     add(triangle_class::nonfinite, &state->nonfinite);
     add(triangle_class::too_far, &state->too_far);
     add(triangle_class::outside, &state->outside);

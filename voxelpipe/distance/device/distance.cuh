@@ -51,30 +51,34 @@ private:
 
 struct distance_history; // names the capacities of these calls
 
-// Runs a call with capacities that suffice: finish(call, memory, shading) launches what comes behind the search.
-template <class Draw, class Finish>
+// Runs a call with capacities that suffice: finish(call, memory, shading, stream) launches what comes behind the
+// search, and then(call, memory, shading, state) goes on once the call has succeeded and was waited for.
+template <class Draw, class Finish, class Then>
 [[nodiscard]] status attempt_distance(cuda_backend& backend, std::span<const Draw> draws, const grid& samples,
-                                      const distance_options& options, std::uint64_t triangles_in,
-                                      const Finish& finish) {
+                                      const distance_options& options, std::uint64_t triangles_in, bool lists_rows,
+                                      const Finish& finish, const Then& then) {
     pipeline_state last{};
     status s =
         attempt(backend.history<distance_history>(),
                 {triangles_in, samples.extent, samples.offset, coverage::conservative}, max_listed_entries,
                 backend.times, backend.stream, [&](attempt_guess& guess, pipeline_state& state, stage_clock* clock) {
-                    distance_call<Draw> call{draws,        samples, options, static_cast<std::uint32_t>(triangles_in),
-                                             guess.limits, clock};
+                    using call_type = distance_call<Draw>;
+                    const call_type call{draws,        samples, options,   static_cast<std::uint32_t>(triangles_in),
+                                         guess.limits, clock,   lists_rows};
                     if (!call.fits()) throw std::bad_alloc();
                     void* const memory = backend.workspace().prepare(call.plan_memory(), backend,
                                                                      backend.use_pinned_memory, backend.use_graphs);
+                    arena carved(memory);
+                    auto m = call.take(carved);
+                    typename call_type::shading_type shading{};
                     launch_until(stage::tile_resolve, [&] {
                         state = backend.workspace().run(clock, std::nullopt, sizeof(pipeline_state), backend.stream,
                                                         [&](cudaStream_t on) {
-                                                            arena carved(memory);
-                                                            auto m = call.take(carved);
-                                                            const auto shading = call.search(m, on);
+                                                            shading = call.search(m, on);
                                                             finish(call, m, shading, on);
                                                         });
                     });
+                    if (!has_failed(state, guess.limits)) then(call, m, shading, state);
                     last = state;
                     return false;
                 });
@@ -96,10 +100,12 @@ template <class Mesh, class VertexShader, class Shader, class... Targets>
     device::inside_bits inside;
     const status solid = inside.draw(backend, draws, samples, options, triangles_in);
     if (!solid.ok()) return solid;
-    status s = device::attempt_distance(backend, draws, samples, options, triangles_in,
-                                        [&](const auto& call, const auto& m, const auto& shading, cudaStream_t on) {
-                                            device::shade_into(call, m, shading, inside.rows(), fb, on);
-                                        });
+    status s = device::attempt_distance(
+        backend, draws, samples, options, triangles_in, false,
+        [&](const auto& call, const auto& m, const auto& shading, cudaStream_t on) {
+            device::shade_into(call, m, shading, inside.rows(), fb, on);
+        },
+        [](const auto&...) {});
     s.solid = solid.solid;
     return s;
 }

@@ -6,6 +6,7 @@
 // up to the nearest triangles of all samples.
 
 #include <voxelpipe/device/base/stage_clock.cuh>
+#include <voxelpipe/distance/device/list_samples.cuh>
 #include <voxelpipe/distance/device/shade_samples.cuh>
 #include <voxelpipe/distance/device/triangle_tree.cuh>
 
@@ -28,13 +29,15 @@ struct distance_call<draw<Mesh, VertexShader, Shader>> {
     std::uint32_t num_primitives;
     capacities limits;
     stage_clock* clock = nullptr;
+    bool lists_rows = false; // the samples of the band become lists
 
     // Bricks, the places of listed triangles and the samples of a whole field are numbered.
     [[nodiscard]] bool fits() const {
         const distance_input in = make_distance_input(samples, options);
         std::uint64_t bricks = 1;
         for (int i = 0; i < 3; ++i) bricks *= static_cast<std::uint64_t>(in.bricks[i]);
-        return bricks <= core::max_numbered && limits.tile_pairs <= core::max_numbered;
+        const std::uint64_t rows = static_cast<std::uint64_t>(in.extent.y) * static_cast<std::uint64_t>(in.extent.z);
+        return bricks <= core::max_numbered && rows <= core::max_numbered && limits.tile_pairs <= core::max_numbered;
     }
     [[nodiscard]] bool is_whole() const { return options.band.is_whole; }
 
@@ -45,10 +48,12 @@ struct distance_call<draw<Mesh, VertexShader, Shader>> {
         band_memory band;
         tree_memory tree;
         found_samples found;
+        sample_rows rows;
     };
     [[nodiscard]] memory take(arena& a) const {
         auto* const state = a.take<pipeline_state>(1);
-        memory m{state, draws_type(a, draws), make_distance_input(samples, options), {}, {}, {}};
+        memory m{state, draws_type(a, draws), make_distance_input(samples, options), {}, {}, {}, {}};
+        m.in.num_counted = num_primitives;
         m.in.frames = a.take<triangle_frame>(num_primitives);
         m.in.triangles = a.take<kept_triangle>(num_primitives);
         const std::uint32_t bricks = m.in.num_bricks();
@@ -62,6 +67,7 @@ struct distance_call<draw<Mesh, VertexShader, Shader>> {
         }
         m.found.distances = a.take<float>(places * brick_samples);
         m.found.primitives = a.take<std::uint32_t>(places * brick_samples);
+        if (lists_rows) m.rows = sample_rows::take(a, m.in.extent);
         return m;
     }
     [[nodiscard]] std::size_t plan_memory() const {

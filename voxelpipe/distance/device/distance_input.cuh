@@ -42,6 +42,7 @@ struct distance_input {
     float brick_radius, octant_radius; // of the balls that hold the samples of a brick and of its eighth
     kept_triangle* triangles;          // by primitive
     triangle_frame* frames;            // by primitive
+    std::uint32_t num_counted;         // triangles of the draws; those behind them close holes
 
     [[nodiscard]] VOXELPIPE_HD std::uint32_t num_bricks() const {
         return static_cast<std::uint32_t>(bricks.x) * static_cast<std::uint32_t>(bricks.y) *

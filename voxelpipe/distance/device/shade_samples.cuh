@@ -10,6 +10,7 @@
 #include <voxelpipe/device/scene/scene_memory.cuh>
 #include <voxelpipe/distance/device/band_search.cuh>
 #include <voxelpipe/solid/device/fill_rows.cuh>
+#include <voxelpipe/solid/device/solid_cones.cuh>
 
 #include <cstdint>
 #include <span>
@@ -45,20 +46,21 @@ struct distance_draws {
     draw_geometry* geometries; // null if there is one draw
     draw_shading<Shader, varyings>* shadings;
 
-    distance_draws(arena& memory, std::span<const draw_type> draws) {
+    // num_more: further parts of the geometry.
+    distance_draws(arena& memory, std::span<const draw_type> draws, std::size_t num_more = 0) {
         std::size_t vertices = 0;
         for (const auto& d : draws) vertices += d.mesh.num_vertices();
         positions = vertex_positions::take(memory, vertices);
         vertex_varyings = memory.take<varyings>(std::is_empty_v<varyings> ? 0 : vertices);
-        geometries = memory.take<draw_geometry>(draws.size() > 1 ? draws.size() : 0);
+        geometries = memory.take<draw_geometry>(draws.size() + num_more > 1 ? draws.size() + num_more : 0);
         shadings = memory.take<draw_shading<Shader, varyings>>(draws.size() > 1 ? draws.size() : 0);
     }
 
-    // Runs the vertex shaders.
-    void shade(std::span<const draw_type> draws, const grid& g, geometry& geo, shading_type& s,
-               cudaStream_t stream) const {
+    // Runs the vertex shaders. `more`: parts of the geometry behind the draws, without shaders.
+    void shade(std::span<const draw_type> draws, const grid& g, geometry& geo, shading_type& s, cudaStream_t stream,
+               std::span<const cone_part> more = {}) const {
         geo = geometry{};
-        geo.num_draws = static_cast<std::uint32_t>(draws.size());
+        geo.num_draws = static_cast<std::uint32_t>(draws.size() + more.size());
         geo.snap = core::make_snap_transform(g);
         geo.extent = g.extent;
         std::vector<draw_geometry> geometry_of(draws.size());
@@ -78,15 +80,22 @@ struct distance_draws {
             vertex += m.num_vertices();
             primitive += static_cast<std::uint32_t>(m.num_triangles());
         }
+        for (const cone_part& part : more) {
+            geometry_of.push_back(part.geometry);
+            geometry_of.back().first_primitive = primitive;
+            primitive += part.num_triangles;
+        }
         geo.num_primitives = primitive;
         geo.one = geometry_of[0];
         s = {shading_of[0], nullptr, core::normal_factors(g), g.offset};
+        if (geometry_of.size() > 1) {
+            upload(
+                geometries, geometry_of.size(), [&](std::size_t d) { return geometry_of[d]; }, stream);
+            geo.many = geometries;
+        }
         if (draws.size() > 1) {
             upload(
-                geometries, draws.size(), [&](std::size_t d) { return geometry_of[d]; }, stream);
-            upload(
                 shadings, draws.size(), [&](std::size_t d) { return shading_of[d]; }, stream);
-            geo.many = geometries;
             s.many = shadings;
         }
     }

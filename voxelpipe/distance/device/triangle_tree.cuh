@@ -220,9 +220,10 @@ __device__ VOXELPIPE_INLINE void visit_one_run(const distance_tree& t, const tre
     run(node);
 }
 
-// Calls run(number) for the runs whose boxes lie within bound(), which may fall meanwhile. All lanes call it.
-template <class Bound, class Run>
-__device__ VOXELPIPE_INLINE void visit_runs(const distance_tree& t, const tree_point& p, tree_stack& stack,
+// Calls run(number) for the runs whose boxes have a distance, p.distance_from(box), of at most bound(), which may fall
+// meanwhile. All lanes call it.
+template <class Point, class Bound, class Run>
+__device__ VOXELPIPE_INLINE void visit_runs(const distance_tree& t, const Point& p, tree_stack& stack,
                                             const Bound& bound, const Run& run) {
     const unsigned lane = threadIdx.x % 32;
     unsigned size = 1;
