@@ -226,8 +226,9 @@ for part in "${parts[@]}"; do
         sanitized_sparse+=':DeviceSparseGoesOn.ConstantsHave*:DeviceSparseMerge.SlabsOfSeveralGpus*-*InPartsOfLargeGrids'
         sanitized_solids='Solids.EveryRuleBodyAndExtentIntoBits:Solids.RowsOfManyCrossings:Solids.Async:Solids.ExteriorAndVote'
         sanitized_solids+=':Solids.VotesOf*:Solids.SlabsOfA*:Solids.ClosedHoles:DeviceRepairs.HolesAndVotes:DeviceRepairs.ListsAndSparseResults'
+        sanitized_distance='DeviceDistance.WholeFields:DeviceDistance.LongLists*:DeviceDistance.Sparse*:DeviceDistance.Points*:*WithoutTriangles'
         sanitized=(small_loads small_lists counting_sort fragment_order fragment_sort immediate immediate_bits kept_graphs tracked_changes
-            sparse solids devices)
+            sparse solids distance devices)
         target="$(printf 'device_%s_test ' "${sanitized[@]}")" build_suite gpu
         end_programs
         for tool in memcheck racecheck initcheck synccheck; do
@@ -244,6 +245,7 @@ for part in "${parts[@]}"; do
                 [[ $program != tracked_changes ]] || filter='*SequencesByOccupancyMaskLeave*:*Clears*'
                 [[ $program != kept_graphs ]] || filter='*AFewLargerTriangles*'
                 [[ $program != solids ]] || filter="$sanitized_solids"
+                [[ $program != distance ]] || filter="$sanitized_distance"
                 [[ $program != sparse ]] || filter="$sanitized_sparse"
                 # Arrays of fragments are copied as wholes, with what lies between the members of a fragment's outputs.
                 [[ $program != sparse || $tool != initcheck ]] || filter+=':*VoxelsOfVeryManyFragments*:*LimitsChangeNothing'

@@ -31,6 +31,7 @@ struct grid {
     glm::ivec3 extent{0};       // voxels to compute: the framebuffer's size
     glm::ivec3 offset{0};       // position of those voxels in the whole grid; 0 unless cropped
     glm::ivec3 whole{0};        // extent of the whole grid, which determines the snapping; 0: the same as `extent`
+    bool corners = false;       // made by at_corners(): lies half a voxel below `origin`, snapped like that grid
 
     // The part [begin, begin + size) of this grid, for slabs on several devices or out-of-core runs. Its voxels,
     // fragments and shader inputs are exactly those of the whole grid; fragment::voxel remains an index of the whole
@@ -41,6 +42,16 @@ struct grid {
         part.offset = offset + begin;
         part.extent = size;
         return part;
+    }
+
+    // The grid whose voxels have this one's corners as their centres: one voxel more an axis, half a voxel lower.
+    // Positions snap as in this grid, so both see the same triangles. This one must not be such a grid itself.
+    [[nodiscard]] grid at_corners() const {
+        grid moved = *this;
+        moved.whole = whole_extent() + 1;
+        moved.extent = extent + 1;
+        moved.corners = true;
+        return moved;
     }
 
     // Voxels of the whole grid, which determine the snapping.
@@ -55,7 +66,7 @@ struct grid {
     }
 
     // World position of the computed part's lowest corner.
-    [[nodiscard]] glm::dvec3 part_origin() const { return origin + glm::dvec3(offset) * voxel_size; }
+    [[nodiscard]] glm::dvec3 part_origin() const { return origin + (glm::dvec3(offset) - half()) * voxel_size; }
 
     // Conversions between world and voxels. Voxels are numbered as in framebuffers and A-buffers, from the corner of
     // the computed part; for fragment::voxel in a crop, use those of uncropped().
@@ -63,13 +74,16 @@ struct grid {
     // World position of continuous voxel coordinates, in which voxel (i, j, k) is the box from (i, j, k) to (i + 1,
     // j + 1, k + 1).
     [[nodiscard]] VOXELPIPE_HD glm::dvec3 to_world(const glm::dvec3& p) const {
-        return {exact::fma(offset.x + p.x, voxel_size.x, origin.x), exact::fma(offset.y + p.y, voxel_size.y, origin.y),
-                exact::fma(offset.z + p.z, voxel_size.z, origin.z)};
+        const double h = half();
+        return {exact::fma(offset.x + p.x - h, voxel_size.x, origin.x),
+                exact::fma(offset.y + p.y - h, voxel_size.y, origin.y),
+                exact::fma(offset.z + p.z - h, voxel_size.z, origin.z)};
     }
     // Continuous voxel coordinates of a world position: the inverse of to_world, up to rounding.
     [[nodiscard]] VOXELPIPE_HD glm::dvec3 to_voxels(const glm::dvec3& world) const {
-        return {(world.x - origin.x) / voxel_size.x - offset.x, (world.y - origin.y) / voxel_size.y - offset.y,
-                (world.z - origin.z) / voxel_size.z - offset.z};
+        const double h = half();
+        return {(world.x - origin.x) / voxel_size.x - offset.x + h, (world.y - origin.y) / voxel_size.y - offset.y + h,
+                (world.z - origin.z) / voxel_size.z - offset.z + h};
     }
     // World position of a voxel's centre.
     [[nodiscard]] VOXELPIPE_HD glm::dvec3 voxel_center(const glm::ivec3& voxel) const {
@@ -88,6 +102,14 @@ struct grid {
                voxel.z < extent.z;
     }
 
+    // Voxels by which the whole grid lies below `origin`.
+    [[nodiscard]] VOXELPIPE_HD double half() const { return corners ? 0.5 : 0.0; }
+    // Fraction bits of snapped positions.
+    [[nodiscard]] int fraction() const {
+        const glm::ivec3 e = whole_extent();
+        return core::fraction_bits(std::max({e.x, e.y, e.z}) - (corners ? 1 : 0));
+    }
+
     friend bool operator==(const grid&, const grid&) = default;
 };
 
@@ -101,7 +123,7 @@ struct grid {
     const glm::ivec3 whole = g.whole_extent();
     for (int a = 0; a < 3; ++a) {
         if (g.extent[a] <= 0 || whole[a] <= 0) return fail(status_code::bad_extent);
-        if (whole[a] > grid::max_extent) return fail(status_code::extent_too_large);
+        if (whole[a] > grid::max_extent + (g.corners ? 1 : 0)) return fail(status_code::extent_too_large);
         if (g.offset[a] < 0 || g.offset[a] > whole[a] - g.extent[a]) return fail(status_code::bad_crop);
         if (!std::isfinite(g.origin[a])) return fail(status_code::bad_origin);
         if (!std::isfinite(g.voxel_size[a]) || !(g.voxel_size[a] > 0.0)) return fail(status_code::bad_voxel_size);
@@ -116,13 +138,13 @@ namespace core {
 
 // g must be valid. The three numbers that determine a snapped position are rounded here, once.
 [[nodiscard]] inline snap_transform make_snap_transform(const grid& g) {
-    const glm::ivec3 whole = g.whole_extent();
     snap_transform t{};
-    t.fraction = fraction_bits(std::max({whole.x, whole.y, whole.z}));
+    t.fraction = g.fraction();
     for (int a = 0; a < 3; ++a) {
         t.origin[a] = g.origin[a];
         t.scale[a] = static_cast<double>(std::int64_t{1} << t.fraction) / g.voxel_size[a];
-        t.offset[a] = std::int64_t{g.offset[a]} << t.fraction;
+        // Even, as rounding_shift wants it: F is 4 at least.
+        t.offset[a] = (std::int64_t{g.offset[a]} << t.fraction) - (std::int64_t{g.corners} << (t.fraction - 1));
         t.shift[a] = exact::rounding_shift(t.offset[a]);
     }
     return t;

@@ -31,6 +31,7 @@ enum class status_code : std::uint8_t {
     capacity_exceeded,    // the caller's workspace is too small; `required` says what is needed
     strategy_unavailable, // the forced strategy cannot serve the call
     bad_solid_options,    // an option of voxelize_solid is out of its range, or has no meaning with the repair
+    bad_distance_options, // an option of voxelize_distance is out of its range, or options contradict each other
     bad_level,            // a tessellation program gave a level below 1 or above its max_level
     bad_count,            // a geometry program emitted more triangles than its type holds
     bad_subset,           // mesh_view::part: not one number a triangle, or not ascending below `whole`
@@ -113,6 +114,14 @@ struct solid_counters {
     friend bool operator==(const solid_counters&, const solid_counters&) = default;
 };
 
+// What voxelize_distance and distance_at count besides `counters`; zeros from other calls.
+struct distance_counters {
+    std::uint64_t band_samples = 0; // samples that hold their distance; the others hold the band's
+    std::uint64_t bad_points = 0;   // distance_at: points that are not finite or beyond 2^40 sub-voxel units
+    std::uint64_t winding_sums = 0; // repair::winding: samples whose solid angles were summed
+    friend bool operator==(const distance_counters&, const distance_counters&) = default;
+};
+
 // Sizes that a caller's workspace or limits must have; set if `code` is capacity_exceeded.
 struct required_sizes {
     std::uint64_t tile_pairs = 0;         // as workspace_limits
@@ -158,6 +167,9 @@ struct required_sizes {
         return "strategy unavailable: the forced strategy cannot serve this call";
     case status_code::bad_solid_options:
         return "bad solid options: a value out of its range, or a rule or an extent with a repair that has its own";
+    case status_code::bad_distance_options:
+        return "bad distance options: a band that is not above 0, a value out of its range, or a rule or a repair "
+               "where no sign is wanted";
     case status_code::bad_level:
         return "bad level: a tessellation program's edge_level must be 1 to its max_level";
     case status_code::bad_count:
@@ -207,7 +219,8 @@ struct [[nodiscard]] status {
     stage where = stage::validate;                              // the stage that failed; meaningless when ok
     int device_error = 0;                                       // cudaError_t, 0 on the CPU
     counters counts{};                                          // of this call
-    solid_counters solid{};                                     // of voxelize_solid
+    solid_counters solid{};                                     // of voxelize_solid, and of a distance's sign
+    distance_counters distance{};                               // of voxelize_distance and distance_at
     required_sizes required{};                                  // if the capacity did not suffice
     static constexpr std::uint32_t unknown = ~std::uint32_t{0}; // no draw or triangle is named
     std::uint32_t draw = unknown; // of index_out_of_range: the first such triangle and its draw, if voxelize returns

@@ -9,6 +9,9 @@
 #include <voxelpipe/abuffer.hpp>
 #include <voxelpipe/blend.hpp>
 #include <voxelpipe/config.hpp>
+#include <voxelpipe/distance/distance.hpp>
+#include <voxelpipe/distance/distance_ray.hpp>
+#include <voxelpipe/distance/sparse_distance.hpp>
 #include <voxelpipe/framebuffer.hpp>
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/mesh.hpp>

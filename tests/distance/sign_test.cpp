@@ -1,0 +1,88 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Signs: those of an oracle that follows skew rays, and those of voxelize_solid.
+
+#include "distance_support.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace distances {
+namespace {
+
+// The mesh half a voxel higher, whose centres are the corners of the other.
+TEST(DistanceSign, IsThatOfSkewRaysOnClosedMeshes) {
+    splitmix64 random(11);
+    const std::int64_t n = unit::cases(60) * 6 / 10;
+    for (std::int64_t i = 0; i < n; ++i) {
+        SCOPED_TRACE(i);
+        const vp::grid g = solids::unit_grid({9, 8, 7});
+        const mesh m = solids::random_bodies(random, 8, 4);
+        for (const vp::sample where : {vp::sample::centre, vp::sample::corner}) {
+            const field f = library_field(m, g, {.band = vp::band::whole, .sample = where});
+            ASSERT_TRUE(f.status.ok());
+            EXPECT_EQ(f.status.solid.open_rows, 0u);
+            // Both grids have 2^16 steps a voxel, so half a voxel moves nothing but the mesh.
+            const mesh seen = where == vp::sample::corner ? m.moved(glm::vec3(0.5f)) : m;
+            const std::vector<std::int64_t> windings =
+                solids::oracle_windings(seen, solids::unit_grid(f.extent), {3, -7, 5});
+            for (std::size_t s = 0; s < windings.size(); ++s) {
+                ASSERT_EQ(std::signbit(f.distances[s]), windings[s] != 0 && f.distances[s] != 0.0f) << s;
+            }
+        }
+    }
+}
+
+// Every rule, both kinds of bodies and every repair: minus exactly where the solid has a voxel.
+TEST(DistanceSign, IsTheSolidsUnderEveryRuleAndRepair) {
+    splitmix64 random(12);
+    for (int i = 0; i < 6; ++i) {
+        const vp::grid g = solids::unit_grid({22, 21, 20});
+        const std::vector<mesh> draws{solids::random_bodies(random, 18, 3), solids::random_bodies(random, 18, 3),
+                                      solids::tube({3, 4, 5}, {9, 12, 15}, 1.25f)};
+        std::vector<vp::distance_options> all;
+        for (const vp::fill_rule rule : {vp::fill_rule::even_odd, vp::fill_rule::nonzero, vp::fill_rule::positive})
+            for (const vp::bodies bodies : {vp::bodies::call, vp::bodies::draw})
+                for (const vp::repair repair : {vp::repair::none, vp::repair::close_holes})
+                    all.push_back({.rule = rule, .bodies = bodies, .repair = repair});
+        all.push_back({.repair = vp::repair::exterior, .closing = 2});
+        all.push_back({.repair = vp::repair::vote});
+        for (const vp::distance_options& o : all) {
+            const field f = library_field(draws, g, o);
+            ASSERT_TRUE(f.status.ok()) << f.status.message();
+            vp::solid_options same = vp::core::sign_options(o);
+            same.count_voxels = true;
+            const solids::solid s = solids::library_solid(draws, g, same);
+            for (std::size_t v = 0; v < s.voxels.size(); ++v)
+                ASSERT_EQ(std::signbit(f.distances[v]), s.voxels[v] != 0 && f.distances[v] != 0.0f);
+            EXPECT_EQ(f.status.solid, s.status.solid);
+        }
+    }
+}
+
+// Walls of half a voxel and less between two centres, and parallel walls close to each other.
+TEST(DistanceSign, ThinAndCloseWallsKeepTheirSides) {
+    mesh m = solids::box({2.0f, 2.0f, 4.45f}, {14.0f, 14.0f, 4.55f});
+    m.add(solids::box({2.0f, 2.0f, 4.56f}, {14.0f, 14.0f, 4.9f}));
+    m.add(solids::box({2.0f, 2.0f, 8.0f}, {14.0f, 14.0f, 8.4f}));
+    const field f = library_field(m, solids::unit_grid({16, 16, 12}), {.band = vp::band::whole});
+    for (int z = 0; z < 12; ++z)
+        for (int x = 3; x < 13; ++x) EXPECT_EQ(f.distances[f.index(x, 7, z)] < 0.0f, z == 4) << z;
+}
+
+TEST(DistanceSign, ZeroIsPositive) {
+    const field f = library_field(solids::box({1.5f, 1.5f, 1.5f}, {4.5f, 4.5f, 4.5f}), solids::unit_grid({6, 6, 6}));
+    int zeros = 0;
+    for (const float d : f.distances)
+        if (d == 0.0f) {
+            EXPECT_FALSE(std::signbit(d));
+            ++zeros;
+        }
+    EXPECT_EQ(zeros, 4 * 4 * 4 - 2 * 2 * 2);
+}
+
+} // namespace
+} // namespace distances

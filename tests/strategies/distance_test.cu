@@ -1,0 +1,113 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Distances on the device: the bytes and counters of cpu_backend, for every form of a call.
+
+#include "distance_drawings.hpp"
+
+#include <gtest/gtest.h>
+
+using namespace distance_drawings;
+
+// Triangles of all sizes, needles, points and segments, in several draws, with all that a fragment has.
+TEST(DeviceDistance, BandsHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{37, 30, 27};
+    const std::vector<mesh_data> meshes{device_test::mixed_triangles(150, 30, 5), needles(extent, 40, 3)};
+    for (const float voxels : {0.4f, 3.0f, 11.0f})
+        expect_same<every_target>(meshes, unit_grid(extent), everything{3, 1.5f},
+                                  {.band = voxels, .sign = vp::distance_sign::none});
+    expect_same<every_target>(meshes, unit_grid(extent), everything{3, 1.5f},
+                              {.rule = vp::fill_rule::even_odd, .bodies = vp::bodies::draw});
+}
+
+// The ready shader, without and with a sign; grids whose voxels are not cubes; corners; parts of a grid.
+TEST(DeviceDistance, FieldsOfGridsAndTheirParts) {
+    const glm::ivec3 extent{40, 21, 35};
+    mesh_data bodies = device_test::tied_bodies(30, 8, 2);
+    append(bodies, device_test::ball({17, 9, 14}, 6.3f, 7));
+    vp::grid flat = unit_grid(extent);
+    flat.voxel_size = {0.5f, 1.25f, 0.75f};
+    for (const vp::grid& g : {unit_grid(extent), flat, flat.crop({5, 3, 2}, {29, 14, 31})})
+        for (const vp::sample where : {vp::sample::centre, vp::sample::corner}) {
+            expect_same<two_targets>({bodies}, g, nearest_shader{}, {.sample = where});
+            expect_same<one_target>({bodies}, g, vp::distance{},
+                                    {.band = 2, .sample = where, .sign = vp::distance_sign::none});
+        }
+}
+
+TEST(DeviceDistance, WholeFields) {
+    const glm::ivec3 extent{33, 18, 25};
+    mesh_data m = device_test::mixed_triangles(90, 20, 8);
+    append(m, device_test::ball({17, 9, 14}, 6.3f, 6));
+    expect_same<two_targets>({m}, unit_grid(extent), nearest_shader{}, {.band = vp::band::whole});
+    expect_same<two_targets>({device_test::ball({90, -40, 14}, 9, 6), needles(extent, 40, 7)}, unit_grid(extent),
+                             nearest_shader{}, {.band = vp::band::whole, .sign = vp::distance_sign::none});
+}
+
+// Rules, bodies and repairs decide the sign.
+TEST(DeviceDistance, SignsOfEveryRuleAndRepair) {
+    const glm::ivec3 extent{35, 20, 22};
+    mesh_data open = device_test::ball({12, 9, 10}, 7.3f, 6);
+    open.triangles.resize(open.triangles.size() - 9);
+    const std::vector<mesh_data> meshes{open, device_test::tied_bodies(20, 5, 2)};
+    for (const vp::distance_options& o :
+         {vp::distance_options{}, vp::distance_options{.rule = vp::fill_rule::positive},
+          vp::distance_options{.bodies = vp::bodies::draw, .repair = vp::repair::close_holes},
+          vp::distance_options{.repair = vp::repair::exterior, .closing = 1},
+          vp::distance_options{.repair = vp::repair::vote}})
+        expect_same<two_targets>(meshes, unit_grid(extent), nearest_shader{}, o);
+}
+
+// Lists that blocks share, triangles far larger than the grid and of the wide form, coincident and opposite ones.
+TEST(DeviceDistance, LongListsAndLargeTriangles) {
+    const glm::ivec3 extent{20, 18, 17};
+    mesh_data m = device_test::translated(device_test::mixed_triangles(1200, 4, 11), {9, 9, 7});
+    expect_same<two_targets>({m}, unit_grid(extent), nearest_shader{}, {.sign = vp::distance_sign::none});
+    mesh_data large;
+    for (int i = 0; i < 6; ++i) {
+        const auto f = static_cast<float>(i);
+        device_test::add_triangle(large, {-1e3f * f, 3 + f, -7}, {2e4f, 5 + f, 9}, {7, 6 - f, 3e6f});
+        device_test::add_triangle(large, {7, 6 - f, 3e6f}, {2e4f, 5 + f, 9}, {-1e3f * f, 3 + f, -7});
+    }
+    const vp::grid far = unit_grid(glm::ivec3(150, 140, 130));
+    for (const vp::grid& g : {unit_grid(extent), far.crop({125, 2, 3}, {19, 11, 21})})
+        for (const vp::band& b : {vp::band(3.0), vp::band::whole})
+            expect_same<two_targets>({large}, g, nearest_shader{}, {.band = b, .sign = vp::distance_sign::none});
+}
+
+TEST(DeviceDistance, MeshesWithoutTriangles) {
+    for (const vp::band& b : {vp::band(3.0), vp::band::whole}) {
+        expect_same<two_targets>({mesh_data{}}, unit_grid(glm::ivec3(9)), nearest_shader{}, {.band = b});
+        expect_same<two_targets>({mesh_data{}, mesh_data{}}, unit_grid(glm::ivec3(9)), nearest_shader{}, {.band = b});
+    }
+    mesh_data wrong = device_test::ball({4, 4, 4}, 3, 3);
+    wrong.triangles[4].y = 1000;
+    expect_same<one_target>({wrong}, unit_grid(glm::ivec3(9)), vp::distance{}, {.sign = vp::distance_sign::none},
+                            vp::status_code::index_out_of_range);
+}
+
+// The samples of the band in bricks: cleared, loaded, in parts of a grid, and of several targets with a discard.
+TEST(DeviceDistance, SparseFramebuffersHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{43, 26, 21};
+    mesh_data bodies = device_test::tied_bodies(25, 3, 2);
+    append(bodies, device_test::ball({17, 9, 14}, 6.3f, 6));
+    const vp::grid whole = unit_grid(glm::ivec3(60, 40, 40));
+    for (const vp::grid& g : {unit_grid(extent), whole.crop({3, 5, 2}, {37, 23, 19})})
+        for (const vp::sample where : {vp::sample::centre, vp::sample::corner})
+            expect_same_bricks({bodies, device_test::ball({30, 20, 9}, 4, 4)}, g, {.band = 2, .sample = where});
+    expect_same_bricks({bodies}, unit_grid({13, 9, 10}), {.band = vp::band::whole, .sign = vp::distance_sign::none});
+}
+
+TEST(DeviceDistance, PointsHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{35, 20, 22};
+    mesh_data open = device_test::ball({12, 9, 10}, 7.3f, 6);
+    open.triangles.resize(open.triangles.size() - 9);
+    const std::vector<mesh_data> meshes{open, device_test::tied_bodies(20, 5, 2), needles(extent, 20, 3),
+                                        device_test::mixed_triangles(40, 20, 9)};
+    for (const vp::distance_options& o :
+         {vp::distance_options{}, vp::distance_options{.sign = vp::distance_sign::none},
+          vp::distance_options{.bodies = vp::bodies::draw, .repair = vp::repair::close_holes},
+          vp::distance_options{.rule = vp::fill_rule::even_odd}})
+        expect_same_points(meshes, unit_grid(extent), 300, o);
+    expect_same_points({mesh_data{}}, unit_grid(extent), 10, {});
+}

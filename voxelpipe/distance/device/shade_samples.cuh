@@ -1,0 +1,239 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// One fragment a sample, from what the search has found, into the targets of a framebuffer. The 32 samples of a warp
+// are a word of a target of bits, which no other warp writes.
+
+#include <voxelpipe/core/interpolate.hpp>
+#include <voxelpipe/core/numbering.hpp>
+#include <voxelpipe/device/scene/scene_memory.cuh>
+#include <voxelpipe/distance/device/band_search.cuh>
+#include <voxelpipe/solid/device/fill_rows.cuh>
+#include <voxelpipe/solid/device/solid_cones.cuh>
+
+#include <cstdint>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+namespace voxelpipe::device {
+
+// The draws' shaders and varyings.
+template <class Shader, class Varyings>
+struct distance_shading {
+    using shader_type = Shader;
+    using varyings = Varyings;
+    draw_shading<Shader, Varyings> one;
+    const draw_shading<Shader, Varyings>* many;
+    core::triple<double> normal_factors;
+    glm::ivec3 offset; // of the computed part in the whole grid
+
+    [[nodiscard]] __device__ const draw_shading<Shader, Varyings>& draw(std::uint32_t d) const {
+        return many != nullptr ? many[d] : one;
+    }
+};
+
+// Device memory for the draws of a call.
+template <class Mesh, class VertexShader, class Shader>
+struct distance_draws {
+    using varyings = typename core::shaded<Mesh, VertexShader>::varyings;
+    using shading_type = distance_shading<Shader, varyings>;
+    using draw_type = draw<Mesh, VertexShader, Shader>;
+
+    vertex_positions positions;
+    varyings* vertex_varyings;
+    draw_geometry* geometries; // null if there is one draw
+    draw_shading<Shader, varyings>* shadings;
+
+    // num_more: further parts of the geometry.
+    distance_draws(arena& memory, std::span<const draw_type> draws, std::size_t num_more = 0) {
+        std::size_t vertices = 0;
+        for (const auto& d : draws) vertices += d.mesh.num_vertices();
+        positions = vertex_positions::take(memory, vertices);
+        vertex_varyings = memory.take<varyings>(std::is_empty_v<varyings> ? 0 : vertices);
+        geometries = memory.take<draw_geometry>(draws.size() + num_more > 1 ? draws.size() + num_more : 0);
+        shadings = memory.take<draw_shading<Shader, varyings>>(draws.size() > 1 ? draws.size() : 0);
+    }
+
+    // Runs the vertex shaders. `more`: parts of the geometry behind the draws, without shaders.
+    void shade(std::span<const draw_type> draws, const grid& g, geometry& geo, shading_type& s, cudaStream_t stream,
+               std::span<const cone_part> more = {}) const {
+        geo = geometry{};
+        geo.num_draws = static_cast<std::uint32_t>(draws.size() + more.size());
+        geo.snap = core::make_snap_transform(g);
+        geo.extent = g.extent;
+        std::vector<draw_geometry> geometry_of(draws.size());
+        std::vector<core::numbering> numbers = core::make_numberings(draws);
+        numbers.resize(draws.size());
+        std::vector<draw_shading<Shader, varyings>> shading_of;
+        std::size_t vertex = 0;
+        std::uint32_t primitive = 0;
+        for (std::size_t d = 0; d < draws.size(); ++d) {
+            const Mesh& m = draws[d].mesh;
+            const vertex_positions of_draw = positions.from(vertex);
+            varyings* const own =
+                std::is_empty_v<varyings> || vertex_varyings == nullptr ? nullptr : vertex_varyings + vertex;
+            geometry_of[d] = geometry_from(m, of_draw, primitive);
+            shading_of.push_back({draws[d].fragment_shader, own, numbers[d]});
+            vertex_shade(m, draws[d].vertex_shader, geo.snap, static_cast<std::uint32_t>(d), of_draw, own, stream);
+            vertex += m.num_vertices();
+            primitive += static_cast<std::uint32_t>(m.num_triangles());
+        }
+        for (const cone_part& part : more) {
+            geometry_of.push_back(part.geometry);
+            geometry_of.back().first_primitive = primitive;
+            primitive += part.num_triangles;
+        }
+        geo.num_primitives = primitive;
+        geo.one = geometry_of[0];
+        s = {shading_of[0], nullptr, core::normal_factors(g), g.offset};
+        if (geometry_of.size() > 1) {
+            upload(
+                geometries, geometry_of.size(), [&](std::size_t d) { return geometry_of[d]; }, stream);
+            geo.many = geometries;
+        }
+        if (draws.size() > 1) {
+            upload(
+                shadings, draws.size(), [&](std::size_t d) { return shading_of[d]; }, stream);
+            s.many = shadings;
+        }
+    }
+};
+
+// Rows of bits that say which samples are inside: a target of bits without bricks. Null: none is.
+struct inside_rows {
+    const word* words;
+    glm::ivec3 extent;
+    [[nodiscard]] __device__ VOXELPIPE_INLINE word row(int x, int y, int z) const {
+        if (words == nullptr) return 0;
+        const std::int64_t each = (extent.x + 31) / 32;
+        return words[(std::int64_t{z} * extent.y + y) * each + x / 32];
+    }
+};
+
+// Everything of a fragment but the distance and what lies in front of it.
+template <class Shading, class Fragment>
+__device__ VOXELPIPE_INLINE void fill_fragment(const distance_input& in, const Shading& s, std::uint32_t id,
+                                               const glm::ivec3& at, const typename Shading::varyings& none,
+                                               Fragment& f) {
+    using varyings = typename Shading::varyings;
+    f.draw = in.geo.find_draw(id);
+    loaded_triangle tri;
+    in.geo.draw(f.draw).locate(id, tri);
+    const auto& d = s.draw(f.draw);
+    f.triangle = tri.triangle;
+    f.instance = tri.instance;
+    f.primitive = id;
+    if (d.numbers.whole != 0) {
+        const core::visible_numbers seen = d.numbers.of(tri.triangle, tri.instance);
+        f.triangle = seen.triangle;
+        f.primitive = seen.primitive;
+    }
+    const core::seen_triangle seen = see_exactly(in, id, in.position(at), true);
+    const core::closest_region region = core::find_distance(seen, in.scale).region;
+    const core::triple<double> weights = core::closest_weights(seen, in.scale, region);
+    const core::triple<double> offset = core::to_closest(seen, in.scale, region);
+    f.side = core::side_of(seen);
+    f.barycentric = {exact::to_float(weights[0]), exact::to_float(weights[1]), exact::to_float(weights[2])};
+    f.to_closest = {exact::to_float(offset[0]), exact::to_float(offset[1]), exact::to_float(offset[2])};
+    f.normal = core::unit_normal(seen, s.normal_factors);
+    for (int i = 0; i < 3; ++i) {
+        if constexpr (std::is_empty_v<varyings>)
+            f.vertex_varyings[i] = &none;
+        else
+            f.vertex_varyings[i] = d.varyings + tri.index[i];
+    }
+    if constexpr (!std::is_empty_v<varyings>)
+        f.varyings = core::mix(*f.vertex_varyings[0], *f.vertex_varyings[1], *f.vertex_varyings[2], f.barycentric.y,
+                               f.barycentric.z);
+}
+
+// The shader's output for a sample. primitive: the nearest, or no_primitive. length: its distance, or the band's.
+template <class Shading>
+[[nodiscard]] __device__ VOXELPIPE_INLINE auto shade_sample(const distance_input& in, const Shading& s,
+                                                            const glm::ivec3& at, std::uint32_t primitive, float length,
+                                                            bool is_inside) {
+    using varyings = typename Shading::varyings;
+    const varyings none{};
+    distance_fragment<varyings> f{};
+    f.primitive = distance_fragment<varyings>::none;
+    f.in_band = primitive != no_primitive;
+    f.inside = is_inside;
+    f.voxel = s.offset + at;
+    f.distance = is_inside && length > 0.0f ? -length : length;
+    if constexpr (!std::is_same_v<typename Shading::shader_type, distance>)
+        if (f.in_band) fill_fragment(in, s, primitive, at, none, f);
+    return s.draw(f.draw).fragment_shader(f);
+}
+
+struct sample_totals {
+    unsigned long long fragments = 0, discarded = 0, in_band = 0;
+    // All threads of the block call it.
+    __device__ void add_up(bool count_voxels, pipeline_state* state) const {
+        const unsigned long long f = block_sum(fragments), d = block_sum(discarded), b = block_sum(in_band);
+        if (threadIdx.x != 0) return;
+        if (f != 0) atomicAdd(&state->fragments, f);
+        if (f != 0 && count_voxels) atomicAdd(&state->voxels, f);
+        if (d != 0) atomicAdd(&state->discarded, d);
+        if (b != 0) atomicAdd(&state->kept, b);
+    }
+};
+
+template <class Shading, class Framebuffer>
+__global__ __launch_bounds__(threads_per_block) void shade_samples_kernel(
+    const __grid_constant__ distance_input in, const __grid_constant__ Shading s,
+    const __grid_constant__ found_samples found, const __grid_constant__ inside_rows inside,
+    const __grid_constant__ Framebuffer fb, bool count_voxels, pipeline_state* state, capacities limits) {
+    using fold = voxel_fold<Framebuffer>;
+    if (has_failed(*state, limits)) return;
+    const int lane = static_cast<int>(threadIdx.x % 32);
+    const auto words_x = static_cast<std::uint64_t>((in.extent.x + 31) / 32);
+    const std::uint64_t num =
+        words_x * static_cast<std::uint64_t>(in.extent.y) * static_cast<std::uint64_t>(in.extent.z);
+    const std::uint64_t warps = std::uint64_t{gridDim.x} * blockDim.x / 32;
+    sample_totals totals;
+    for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x / 32 + warp_in_block(); i < num; i += warps) {
+        const int x0 = static_cast<int>(i % words_x) * 32,
+                  y = static_cast<int>(i / words_x % static_cast<std::uint64_t>(in.extent.y)),
+                  z = static_cast<int>(i / words_x / static_cast<std::uint64_t>(in.extent.y)), x = x0 + lane;
+        const bool is_valid = x < in.extent.x;
+        const word row = inside.row(x0, y, z);
+        auto a = fold::begin(fb, is_valid, x, y, z);
+        bool has_any = false;
+        if (is_valid) {
+            std::uint32_t primitive = no_primitive;
+            float length = in.band;
+            if (found.primitives != nullptr) {
+                const std::uint64_t slot =
+                    found.slot_of(in.brick_number(x / distance_brick, y / distance_brick, z / distance_brick));
+                if (slot != no_slot || found.slots == nullptr) {
+                    const std::uint64_t from = found_samples::place(slot, x, y, z);
+                    primitive = found.primitives[from];
+                    length = found.distances[from];
+                }
+            }
+            const auto out = shade_sample(in, s, {x, y, z}, primitive, length, (row >> lane & 1u) != 0);
+            has_any = out.keep;
+            ++(out.keep ? totals.fragments : totals.discarded);
+            totals.in_band += static_cast<unsigned>(primitive != no_primitive);
+            if (out.keep) fold::apply(a, out.values);
+        }
+        __syncwarp();
+        if (__any_sync(0xffffffffu, static_cast<int>(has_any)) != 0) fold::store(fb, a, has_any, x0, y, z);
+    }
+    totals.add_up(count_voxels, state);
+}
+
+template <class Shading, class Framebuffer>
+void shade_samples(const distance_input& in, const Shading& s, const found_samples& found, const inside_rows& inside,
+                   const Framebuffer& fb, bool count_voxels, pipeline_state* state, const capacities& limits,
+                   cudaStream_t stream) {
+    const std::uint64_t samples = static_cast<std::uint64_t>((in.extent.x + 31) / 32) * 32 *
+                                  static_cast<std::uint64_t>(in.extent.y) * static_cast<std::uint64_t>(in.extent.z);
+    shade_samples_kernel<Shading, Framebuffer>
+        <<<fill_device(samples), threads_per_block, 0, stream>>>(in, s, found, inside, fb, count_voxels, state, limits);
+    check(cudaGetLastError(), stage::tile_resolve);
+}
+
+} // namespace voxelpipe::device
