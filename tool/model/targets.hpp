@@ -24,7 +24,9 @@ enum class target : std::uint8_t {
     normal,
     material,
     triangle,
-    depth
+    depth,
+    distance,
+    nearest
 };
 
 struct target_info {
@@ -50,6 +52,9 @@ inline constexpr std::array target_table{
     target_info{target::triangle, "triangle", scalar::i32, 1, "number of the last triangle; empty: -1", UINT32_MAX},
     target_info{target::depth, "depth", scalar::f32, 1, "least world position along --depth-axis; empty: NaN",
                 0x7fc00000},
+    target_info{target::distance, "distance", scalar::f32, 1, "what --distance gives, see DISTANCES"},
+    target_info{target::nearest, "nearest", scalar::i64, 1,
+                "with --distance: number of the nearest triangle; beyond the band: -1", UINT32_MAX},
 };
 
 [[nodiscard]] constexpr const target_info& info_of(target id) { return target_table[static_cast<std::size_t>(id)]; }
