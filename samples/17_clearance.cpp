@@ -66,8 +66,13 @@ int main() {
 
     const int slice = grid.extent.y / 2;
     const auto look = [&](float px, float py, const glm::vec2&) {
-        const int x = static_cast<int>(px * 200.0f), z = static_cast<int>(py * 200.0f);
-        const float a = of_bushing(x, slice, z), b = of_pin(x, slice, z), in = -std::min(a, b);
+        const glm::vec2 p = glm::clamp(glm::vec2(px, py) * 200.0f - 0.5f, 0.0f, 198.99f), low = glm::floor(p);
+        const auto at = [&](const auto& f) { // between the four samples around
+            const int x = static_cast<int>(low.x), z = static_cast<int>(low.y);
+            return glm::mix(glm::mix(f(x, slice, z), f(x + 1, slice, z), p.x - low.x),
+                            glm::mix(f(x, slice, z + 1), f(x + 1, slice, z + 1), p.x - low.x), p.y - low.y);
+        };
+        const float a = at(of_bushing), b = at(of_pin), in = -std::min(a, b);
         const glm::vec3 cold(0.07f, 0.16f, 0.36f), warm(0.95f, 0.55f, 0.16f), air(0.86f, 0.88f, 0.90f);
         glm::vec3 c = air;
         if (a < 0.0f) c = glm::mix(cold, warm, glm::clamp(in / 9.5f, 0.0f, 1.0f)); // the wall, by its depth
