@@ -134,7 +134,7 @@ TEST(DistanceSparse, HoldsTheBandOfTheDenseField) {
                 for (int x = 0; x < f.extent.x; ++x) {
                     const std::size_t at = f.index(x, y, z);
                     const bool in = f.nearest[at] >= 0;
-                    ASSERT_EQ(host.exists({x, y, z}), in);
+                    ASSERT_EQ(host.contains({x, y, z}), in);
                     ASSERT_EQ(vp::get<0>(host)(x, y, z), in ? f.distances[at] : 2.0f);
                     ASSERT_EQ(vp::get<1>(host)(x, y, z), f.nearest[at]);
                 }

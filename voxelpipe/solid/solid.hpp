@@ -44,7 +44,7 @@ enum class repair : std::uint8_t {
     exterior, // what a flood from outside the grid does not reach through untouched voxels: fills cavities; no crops
     vote,     // what most of the closed rows along x, y and z call inside by even_odd; a tie is outside
     // Where the generalized winding number, solid angles over 4 pi, is at least 1/2 (nonzero: its magnitude; even_odd
-    // is refused). Needs no lids; holes are closed by the cones of close_holes only to count rows in integers first.
+    // is refused as bad_solid_options). Reserved: no backend draws it yet, and calls return strategy_unavailable.
     winding,
 };
 
@@ -151,7 +151,8 @@ inline constexpr bool takes_solid_slabs = requires {
         return failure(status_code::bad_solid_options);
     constexpr solid_options plain;
     if (o.repair == repair::winding && o.rule == fill_rule::even_odd) return failure(status_code::bad_solid_options);
-    if (o.repair != repair::none && o.repair != repair::close_holes && o.repair != repair::winding &&
+    if (o.repair == repair::winding) return failure(status_code::strategy_unavailable);
+    if (o.repair != repair::none && o.repair != repair::close_holes &&
         (o.rule != plain.rule || o.extent != plain.extent))
         return failure(status_code::bad_solid_options);
     if (o.slab != nullptr) {
