@@ -130,7 +130,9 @@ TEST(Distance, ValuesAreThoseOfTheNearestTriangle) {
         ASSERT_EQ(is_left ? glm::u8vec4(255, 0, 0, 255) : glm::u8vec4(0, 0, 255, 255), colors.at<glm::u8vec4>(i)) << i;
         const double depth = depths.at<float>(i); // of the closest point
         ASSERT_LE(std::abs(depth), 1) << i;
-        if (std::abs(p.z) > 1) ASSERT_EQ(std::clamp(p.z, -1.0, 1.0), depth) << i;
+        if (std::abs(p.z) > 1) {
+            ASSERT_EQ(std::clamp(p.z, -1.0, 1.0), depth) << i;
+        }
         ASSERT_FLOAT_EQ(1.0F, glm::length(normals.at<glm::vec3>(i))) << i;
     });
     EXPECT_GT(far, 100U);
