@@ -122,3 +122,27 @@ def test_torch_gives_tensors():
     d, nearest = vp.distance(mesh, GRID, nearest=True)
     assert torch.is_tensor(d) and d.dtype == torch.float32 and nearest.dtype == torch.int64
     assert np.array_equal(d.numpy(), vp.distance((v, f), GRID))
+
+
+def test_points_get_the_distance_of_the_whole_field():
+    mesh = box(LOW, HIGH)
+    at = samples(GRID).reshape(-1, 3).astype(np.float32)
+    d, nearest = vp.distance_at(mesh, at, GRID, nearest=True)
+    assert d.dtype == np.float32 and nearest.dtype == np.int64
+    field, numbers = vp.distance(mesh, GRID, "whole", nearest=True)
+    assert np.array_equal(d, field.ravel()) and np.array_equal(nearest, numbers.ravel())
+    anywhere = np.array([[100.0, 3, 3], [4, 3, 4], [2, 2.5, 2]])
+    assert np.allclose(vp.distance_at(mesh, anywhere), box_distance(anywhere, LOW, HIGH), atol=1e-4)
+
+
+def test_points_that_have_no_distance_are_counted():
+    mesh = box(LOW, HIGH)
+    status = {}
+    at = np.array([[0, 0, 0], [np.nan, 0, 0], [np.inf, 0, 0], [1e30, 0, 0]], np.float32)
+    d, nearest = vp.distance_at(mesh, at, nearest=True, status=status)
+    assert math.isfinite(d[0]) and np.isnan(d[1:]).all() and (nearest[1:] == -1).all() and nearest[0] >= 0
+    assert status["bad_points"] == 3
+    with pytest.raises(ValueError, match=r"\(n, 3\)"):
+        vp.distance_at(mesh, np.zeros((3, 2)))
+    with pytest.raises(ValueError):
+        vp.distance_at(mesh, at, repair="vote")
