@@ -24,7 +24,7 @@
 
 namespace voxelize {
 
-using wanted_targets = std::bitset<target_table.size()>;
+using wanted_targets = std::bitset<target_count>;
 
 template <class Backend>
 class uploaded_scene {

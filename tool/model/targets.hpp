@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string_view>
 
 namespace voxelize {
@@ -38,7 +39,7 @@ struct target_info {
     std::uint32_t empty = 0;      // the bits of each component of an empty voxel
 };
 
-inline constexpr std::array target_table{
+inline constexpr std::array all_targets{
     target_info{target::occupancy, "occupancy", scalar::bit, 1, "1 where a triangle touches the voxel"},
     target_info{target::count, "count", scalar::u32, 1, "number of triangles in the voxel"},
     target_info{target::color, "color", scalar::u8, 4,
@@ -57,12 +58,16 @@ inline constexpr std::array target_table{
                 "with --distance: number of the nearest triangle; beyond the band: -1", UINT32_MAX},
 };
 
-[[nodiscard]] constexpr const target_info& info_of(target id) { return target_table[static_cast<std::size_t>(id)]; }
+inline constexpr std::size_t target_count = all_targets.size();
+// Those of surfaces and solids; the two others go with --distance.
+inline constexpr std::span target_table = std::span(all_targets).first<target_count - 2>();
+
+[[nodiscard]] constexpr const target_info& info_of(target id) { return all_targets[static_cast<std::size_t>(id)]; }
 
 [[nodiscard]] constexpr bool is_color(target id) { return info_of(id).name.starts_with("color"); }
 
 [[nodiscard]] constexpr std::optional<target> target_named(std::string_view name) {
-    for (const target_info& entry : target_table)
+    for (const target_info& entry : all_targets)
         if (entry.name == name) return entry.id;
     return std::nullopt;
 }
