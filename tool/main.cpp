@@ -34,7 +34,7 @@ void print(const command_line& options, const run_report& report) {
         for (const std::filesystem::path& file : report.files) stream << "wrote " << file.string() << '\n';
         if (!report.files.empty())
             stream << report.stats.voxels << " of " << extent.x << " x " << extent.y << " x " << extent.z
-                   << " voxels are covered\n";
+                   << (report.request.distance ? " samples lie in the band\n" : " voxels are covered\n");
         if (report.is_sparse && report.bricks != 0)
             stream << "they lie in " << report.bricks << " bricks of 8 x 8 x 8, "
                    << memory::mebibytes(static_cast<double>(report.brick_bytes)) << " with their values\n";

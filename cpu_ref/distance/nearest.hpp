@@ -70,6 +70,21 @@ class brick_search {
 public:
     explicit brick_search(const distance_scene& scene) : scene_(&scene) {}
 
+    // False only if no sample of a run of four bricks lies within the band.
+    [[nodiscard]] bool is_near_run(const glm::ivec3& first) {
+        const vector3& v = scene_->voxel;
+        if (!(scene_->band_units < std::numeric_limits<float>::infinity())) return true;
+        const vector3 middle{(first.x + 16) * v.x, (first.y + 4) * v.y, (first.z + 4) * v.z};
+        // From the middle to the outermost samples, 15.5 and 3.5 voxels away.
+        const auto reach =
+            static_cast<float>(std::sqrt(240.25 * v.x * v.x + 12.25 * v.y * v.y + 12.25 * v.z * v.z) * (1.0 + 0x1p-20));
+        bool is_near = false;
+        scene_->tree->visit(
+            middle, [&] { return is_near ? 0.0f : scene_->band_units + reach; },
+            [&](std::size_t, std::size_t) { is_near = true; });
+        return is_near;
+    }
+
     // Finds what the samples of a brick have; `first` is its lowest one. Returns false if none is within the band.
     [[nodiscard]] bool find(const glm::ivec3& first) {
         const vector3& v = scene_->voxel;

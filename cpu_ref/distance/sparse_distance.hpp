@@ -72,7 +72,8 @@ template <class Mesh, class VertexShader, class Shader, class... Targets>
                         }
                         const auto row = static_cast<std::uint64_t>(p.z) * ny + static_cast<std::uint64_t>(p.y);
                         mine.kept.push_back({row * nx + static_cast<std::uint64_t>(p.x), id, out.values});
-                    });
+                    },
+                    [](int, int, int, int, std::uint32_t) { return false; });
                 meter.advance();
             });
         }

@@ -29,7 +29,7 @@ public:
     using target_type = target<bit, blend::replace>;
     using framebuffer_type = framebuffer<cpu_backend, target_type>;
 
-    // Draws the solid. `how` a status that is not ok says why there are no bits.
+    // Draws the solid, unless no sign is wanted. A status that is not ok says why there are no bits.
     template <class Mesh, class VertexShader, class Shader>
     [[nodiscard]] status draw(cpu_backend& backend, std::span<const voxelpipe::draw<Mesh, VertexShader, Shader>> draws,
                               const grid& samples, const distance_options& options, std::uint64_t triangles_in) {
@@ -103,22 +103,27 @@ VOXELPIPE_INLINE void fill_fragment(const Scene& s, const distance_scene& d, std
 }
 
 // Calls visit(sample of the grid's part, shader's output, primitive or none) for the samples of a run: all, or those of
-// the band.
-template <bool BandOnly, class Scene, class Visit>
+// the band. rest(first x, end of x, y, z, bits of those inside) may take a row beyond the band instead; it returns
+// whether it has.
+template <bool BandOnly, class Scene, class Visit, class Rest>
 void shade_run(const Scene& s, const distance_scene& d, const inside_bits& inside, const glm::ivec3& first,
-               brick_search& search, distance_counters& counts, const Visit& visit) {
+               brick_search& search, distance_counters& counts, const Visit& visit, const Rest& rest) {
     using shader = typename Scene::fragment_shader;
     using fragment = distance_fragment<typename Scene::varyings>;
     const glm::ivec3 extent = s.where.extent;
     const int x_end = std::min(first.x + run_length, extent.x), y_end = std::min(first.y + brick_size, extent.y),
               z_end = std::min(first.z + brick_size, extent.z);
-    for (int x0 = first.x; x0 < x_end; x0 += brick_size) {
-        const bool found = !d.tree->empty() && search.find({x0, first.y, first.z});
+    const bool is_near = !d.tree->empty() && search.is_near_run(first);
+    if (BandOnly && !is_near) return;
+    for (int x0 = first.x; x0 < x_end; x0 += is_near ? brick_size : run_length) {
+        const bool found = is_near && search.find({x0, first.y, first.z});
         if (BandOnly && !found) continue;
+        const int x1 = std::min(x0 + (is_near ? brick_size : run_length), x_end);
         for (int z = first.z; z < z_end; ++z) {
             for (int y = first.y; y < y_end; ++y) {
                 const std::uint32_t row = inside.row(first.x, y, z);
-                for (int x = x0; x < std::min(x0 + brick_size, x_end); ++x) {
+                if (!found && rest(x0, x1, y, z, row >> (x0 - first.x))) continue;
+                for (int x = x0; x < x1; ++x) {
                     const bool is_inside = (row >> (x - first.x) & 1u) != 0;
                     float length = d.band;
                     std::uint32_t id = fragment::none;
@@ -146,6 +151,13 @@ void shade_run(const Scene& s, const distance_scene& d, const inside_bits& insid
         }
     }
 }
+
+// True for the plain field: every sample of a linear target of floats is replaced, so rows beyond the band are filled
+// and nothing need be cleared first.
+template <class Shader, class... Targets>
+inline constexpr bool is_plain_field = false;
+template <>
+inline constexpr bool is_plain_field<distance, target<float, blend::replace>> = true;
 
 // The one fragment of a sample, into the targets.
 template <class Values, class... Targets>
@@ -249,20 +261,39 @@ template <class Mesh, class VertexShader, class Shader, class... Targets>
         for (std::size_t w = 0; w < workers; ++w)
             own.push_back(std::unique_ptr<scratch>(new scratch{cpu::brick_search(call.scene)}));
         if (fb.changes != nullptr) change_log::forget(fb.changes);
-        cpu::clear_targets(how, fb);
+        constexpr bool is_plain = cpu::is_plain_field<Shader, Targets...>;
+        if constexpr (!is_plain) cpu::clear_targets(how, fb);
+        const float band = call.scene.band;
         const cpu::stopwatch watch(how.times, &stage_times::fine_raster);
         cpu::progress_meter meter(how, runs.count());
         cpu::parallel_for(how.threads, runs.count(), [&](unsigned worker, std::size_t i) {
             scratch& mine = *own[worker];
-            cpu::shade_run<false>(call.shapes, call.scene, inside, runs.first(i), mine.search, mine.distance,
-                                  [&](const glm::ivec3& p, const auto& out, std::uint32_t) {
-                                      if (!out.keep) {
-                                          ++mine.counts.fragments_discarded;
-                                          return;
-                                      }
-                                      ++mine.counts.fragments;
-                                      cpu::blend_once(fb, p, out.values);
-                                  });
+            cpu::shade_run<false>(
+                call.shapes, call.scene, inside, runs.first(i), mine.search, mine.distance,
+                [&](const glm::ivec3& p, const auto& out, std::uint32_t) {
+                    if (!out.keep) {
+                        ++mine.counts.fragments_discarded;
+                        return;
+                    }
+                    ++mine.counts.fragments;
+                    cpu::blend_once(fb, p, out.values);
+                },
+                [&](int x0, int x1, int y, int z, std::uint32_t bits) {
+                    if constexpr (is_plain) {
+                        const auto& t = get<0>(fb.targets);
+                        const int n = x1 - x0;
+                        mine.counts.fragments += static_cast<std::uint64_t>(n);
+                        if (t.load == load_operation::off) return true;
+                        float* const row = t.elements + target<float, blend::replace>::map::cell(t.extent, x0, y, z);
+                        const std::uint32_t all = n == 32 ? ~0u : (1u << n) - 1;
+                        if ((bits & all) == 0 || (bits & all) == all)
+                            std::fill_n(row, n, (bits & all) == 0 ? band : -band);
+                        else
+                            for (int x = 0; x < n; ++x) row[x] = (bits >> x & 1u) != 0 ? -band : band;
+                        return true;
+                    }
+                    return false;
+                });
             meter.advance();
         });
         for (const auto& s : own) {

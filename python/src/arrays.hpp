@@ -65,6 +65,7 @@ template <class Container>
 void bind_grid(nb::module_& m);
 void bind_surface(nb::module_& m);
 void bind_solid(nb::module_& m);
+void bind_distance(nb::module_& m);
 void bind_bake_float(nb::module_& m);
 void bind_bake_integer(nb::module_& m);
 void bind_sparse_float(nb::module_& m);

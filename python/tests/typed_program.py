@@ -11,5 +11,6 @@ def occupied(vertices: np.ndarray, triangles: np.ndarray) -> int:
     shape: tuple[int, int, int] = grid.shape
     picture: np.ndarray = vp.render(vp.voxelize((vertices, triangles), grid), grid)
     lists: vp.Fragments = vp.fragments((vertices, triangles), grid)
-    del picture, lists
+    field: np.ndarray = vp.distance((vertices, triangles), grid, "whole", corners=True)
+    del picture, lists, field
     return shape[0]

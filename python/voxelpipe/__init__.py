@@ -9,6 +9,7 @@ same bytes on every machine and any number of threads.
     grid = vp.fit(mesh, 256)
     surface = vp.voxelize(mesh, grid)        # bool, (nz, ny, nx)
     inside = vp.solid(mesh, grid)            # the same, filled
+    field = vp.distance(mesh, grid)          # float32, negative inside
     vp.save("surface.png", surface, grid)
 
 A mesh is a pair (vertices, triangles) of arrays, a mesh of trimesh, Open3D or PyVista, a path, or a list of those.
@@ -19,6 +20,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from ._bake import bake, sparse
 from ._core import Grid
+from ._distance import distance, distance_at
 from ._fit import fit
 from ._save import render, save
 from ._solid import OpenMeshWarning, solid
@@ -37,6 +39,8 @@ __all__ = [
     "OpenMeshWarning",
     "View",
     "bake",
+    "distance",
+    "distance_at",
     "fit",
     "fragments",
     "render",

@@ -13,10 +13,10 @@
 namespace distances {
 namespace {
 
-// The mesh half a voxel higher, whose centres are the corners of the other.
+// A mesh moved half a voxel up has the other's corners at the centres.
 TEST(DistanceSign, IsThatOfSkewRaysOnClosedMeshes) {
     splitmix64 random(11);
-    const std::int64_t n = unit::cases(60) * 6 / 10;
+    const std::int64_t n = unit::cases(100) * 4 / 10;
     for (std::int64_t i = 0; i < n; ++i) {
         SCOPED_TRACE(i);
         const vp::grid g = solids::unit_grid({9, 8, 7});
@@ -39,7 +39,8 @@ TEST(DistanceSign, IsThatOfSkewRaysOnClosedMeshes) {
 // Every rule, both kinds of bodies and every repair: minus exactly where the solid has a voxel.
 TEST(DistanceSign, IsTheSolidsUnderEveryRuleAndRepair) {
     splitmix64 random(12);
-    for (int i = 0; i < 6; ++i) {
+    const std::int64_t n = unit::cases(100) / 50;
+    for (std::int64_t i = 0; i < n; ++i) {
         const vp::grid g = solids::unit_grid({22, 21, 20});
         const std::vector<mesh> draws{solids::random_bodies(random, 18, 3), solids::random_bodies(random, 18, 3),
                                       solids::tube({3, 4, 5}, {9, 12, 15}, 1.25f)};

@@ -44,7 +44,7 @@ enum class solid_extent : std::uint8_t {
 [[nodiscard]] const char* to_string(solid_extent extent);
 
 // The colour of the voxels inside, of each target that is a colour.
-using fill_means = std::array<std::array<std::uint8_t, 4>, target_table.size()>;
+using fill_means = std::array<std::array<std::uint8_t, 4>, target_count>;
 
 struct solid_request {
     solid_rule rule = solid_rule::nonzero;

@@ -24,7 +24,7 @@
 
 namespace voxelize {
 
-using wanted_targets = std::bitset<target_table.size()>;
+using wanted_targets = std::bitset<target_count>;
 
 template <class Backend>
 class uploaded_scene {
@@ -42,8 +42,10 @@ public:
         : backend_{backend}, request_{request}, wanted_{wanted},
           reference_{reference_point(request.grid)}, tables_{backend, std::vector<color_tables>{make_color_tables()}} {
         upload_pictures(model);
-        // A solid may be filled draw by draw.
-        const std::uint64_t most_copies = request.solid ? 1 : UINT32_MAX;
+        // A solid, and the sign of distances, may be decided draw by draw.
+        const bool by_draws =
+            request.solid || (request.distance && request.distance->sign.rule == solid_rule::each_draw);
+        const std::uint64_t most_copies = by_draws ? 1 : UINT32_MAX;
         const std::vector<run> triangle_runs = runs_of(model, &primitive::triangles, most_copies);
         const std::vector<run> line_runs =
             with_lines ? runs_of(model, &primitive::lines, most_copies) : std::vector<run>();

@@ -4,6 +4,7 @@
 // scene + options -> volume: all targets in one pass of the pipeline, on the backend of the user's choice. The result
 // is the same bytes for every backend, number of threads and amount of working memory.
 
+#include "distance/distance_request.hpp"
 #include "model/memory.hpp"
 #include "model/scene.hpp"
 #include "model/targets.hpp"
@@ -47,6 +48,7 @@ struct voxelize_request {
     int padding = 0; // voxels of it on every side in which nothing is drawn
     voxelpipe::coverage coverage = voxelpipe::coverage::conservative;
     std::optional<solid_request> solid;             // instead of the surface, whose coverage is conservative then
+    std::optional<distance_request> distance;       // instead of both; the grid is that of the samples then
     std::vector<target> targets{target::occupancy}; // channels of the volume, in this order, none twice
     int depth_axis = 2;                             // 0 x, 1 y, 2 z
     blend_alpha alpha = blend_alpha::weight;

@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string_view>
 
 namespace voxelize {
@@ -24,7 +25,9 @@ enum class target : std::uint8_t {
     normal,
     material,
     triangle,
-    depth
+    depth,
+    distance,
+    nearest
 };
 
 struct target_info {
@@ -36,7 +39,7 @@ struct target_info {
     std::uint32_t empty = 0;      // the bits of each component of an empty voxel
 };
 
-inline constexpr std::array target_table{
+inline constexpr std::array all_targets{
     target_info{target::occupancy, "occupancy", scalar::bit, 1, "1 where a triangle touches the voxel"},
     target_info{target::count, "count", scalar::u32, 1, "number of triangles in the voxel"},
     target_info{target::color, "color", scalar::u8, 4,
@@ -50,14 +53,21 @@ inline constexpr std::array target_table{
     target_info{target::triangle, "triangle", scalar::i32, 1, "number of the last triangle; empty: -1", UINT32_MAX},
     target_info{target::depth, "depth", scalar::f32, 1, "least world position along --depth-axis; empty: NaN",
                 0x7fc00000},
+    target_info{target::distance, "distance", scalar::f32, 1, "what --distance gives, see DISTANCES"},
+    target_info{target::nearest, "nearest", scalar::i64, 1,
+                "with --distance: number of the nearest triangle; beyond the band: -1", UINT32_MAX},
 };
 
-[[nodiscard]] constexpr const target_info& info_of(target id) { return target_table[static_cast<std::size_t>(id)]; }
+inline constexpr std::size_t target_count = all_targets.size();
+// Those of surfaces and solids; the two others go with --distance.
+inline constexpr std::span target_table = std::span(all_targets).first<target_count - 2>();
+
+[[nodiscard]] constexpr const target_info& info_of(target id) { return all_targets[static_cast<std::size_t>(id)]; }
 
 [[nodiscard]] constexpr bool is_color(target id) { return info_of(id).name.starts_with("color"); }
 
 [[nodiscard]] constexpr std::optional<target> target_named(std::string_view name) {
-    for (const target_info& entry : target_table)
+    for (const target_info& entry : all_targets)
         if (entry.name == name) return entry.id;
     return std::nullopt;
 }

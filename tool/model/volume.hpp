@@ -18,6 +18,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -91,11 +92,18 @@ struct channel {
     std::function<void(std::uint64_t first, std::span<std::byte> to)> read = {};
 };
 
+// What the channel "distance" of a volume holds: distances from a mesh in world units, a sample at each voxel's centre.
+struct distance_field {
+    float band = std::numeric_limits<float>::infinity(); // what samples further away hold; infinity: there are none
+    bool is_signed = true;                               // negative inside
+};
+
 struct volume {
     std::array<std::int64_t, 3> extent{0, 0, 0}; // nx, ny, nz, each >= 1 in a valid volume
     std::array<double, 3> origin{0, 0, 0};       // world position of the low corner of voxel (0,0,0)
     std::array<double, 3> voxel_size{1, 1, 1};   // world units, per axis, > 0
     std::vector<channel> channels;
+    std::optional<distance_field> distances; // of a volume with the channel "distance"
 
     [[nodiscard]] std::int64_t num_voxels() const { return extent[0] * extent[1] * extent[2]; }
 

@@ -130,6 +130,7 @@ command_line parse_command_line(int argc, const char* const* argv) {
         options.arguments.emplace_back(options.storage == storage_choice::sparse ? "--sparse" : "--dense");
     understand_batch(options, app.count("--world-size") != 0, app.count("--rank") != 0);
     understand_solid(options, raw);
+    understand_distance(options, raw);
     understand_grid(options, raw);
     understand_outputs(options, raw);
     understand_picture(options, raw);

@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <iomanip>
+#include <sstream>
+#include <string>
 #include <utility>
 
 namespace voxelize {
@@ -49,6 +51,13 @@ double sum_of_stages(const run_report& report) {
     double sum = 0;
     for (const auto& [stage, time] : report.stats.milliseconds) sum += time;
     return sum;
+}
+
+// A number without needless digits.
+std::string shortest(double number) {
+    std::ostringstream text;
+    text << number;
+    return text.str();
 }
 
 } // namespace
@@ -92,7 +101,17 @@ void print_text(std::ostream& stream, const run_report& report) {
     line("fragments") << report.stats.fragments;
     if (report.stats.fragments_discarded != 0) stream << " (" << report.stats.fragments_discarded << " more discarded)";
     stream << '\n';
-    line("voxels") << report.stats.voxels << '\n';
+    line(report.request.distance ? "samples in band" : "voxels") << report.stats.voxels << '\n';
+    if (report.request.distance) {
+        const distance_request& distance = *report.request.distance;
+        line("distance") << (distance.is_whole ? std::string("whole")
+                                               : "band of " + shortest(distance.band) + " voxels")
+                         << ", " << (distance.is_signed ? to_string(distance.sign.rule) : "unsigned") << ", at "
+                         << (distance.at_corners ? "corners" : "centres");
+        if (report.stats.solid)
+            stream << ", " << report.stats.solid->open_rows << " of " << report.stats.solid->rows << " rows open";
+        stream << '\n';
+    }
     if (report.stats.solid && report.request.solid)
         line("solid") << to_string(report.request.solid->rule) << ", " << to_string(report.request.solid->extent)
                       << ", " << report.stats.solid->crossings << " crossings, " << report.stats.solid->open_rows
@@ -147,6 +166,14 @@ void print_json(std::ostream& stream, const run_report& report) {
             root["solid"]["holes"] = report.stats.solid->holes;
             root["solid"]["closed_holes"] = report.stats.solid->closed_holes;
         }
+    }
+    if (report.request.distance) {
+        const distance_request& distance = *report.request.distance;
+        root.erase("coverage");
+        root["distance"] = {{"band", distance.is_whole ? json("whole") : json(distance.band)},
+                            {"samples", distance.at_corners ? "corners" : "centres"},
+                            {"sign", distance.is_signed ? to_string(distance.sign.rule) : "unsigned"}};
+        if (report.stats.solid) root["distance"]["open_rows"] = report.stats.solid->open_rows;
     }
     root["targets"] = json::array();
     for (const target id : report.request.targets) root["targets"].push_back(info_of(id).name);

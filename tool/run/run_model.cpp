@@ -4,6 +4,7 @@
 
 #include "draw/backend_estimate.hpp"
 #include "draw/cuda_device.hpp"
+#include "draw/distance/distance_voxelizer.hpp"
 #include "draw/picture_levels.hpp"
 #include "draw/sparse/sparse_voxelizer.hpp"
 #include "draw/sparse/streamed_model.hpp"
@@ -11,6 +12,7 @@
 #include "read/model_file.hpp"
 #include "run_outputs.hpp"
 #include "slab_run.hpp"
+#include "write/level_set.hpp"
 #include "write/sparse_formats.hpp"
 #include "write_bytes.hpp"
 
@@ -23,6 +25,7 @@
 #include <optional>
 #include <set>
 #include <system_error>
+#include <type_traits>
 #include <utility>
 
 namespace voxelize {
@@ -36,7 +39,8 @@ double milliseconds_since(clock::time_point start) {
 
 // CUDA, starting already where it will be used or may be.
 std::shared_ptr<cuda_start> start_cuda(const command_line& options) {
-    if (!built_with_cuda() || options.voxelize.backend == backend_choice::cpu) return nullptr;
+    if (!built_with_cuda() || options.voxelize.backend == backend_choice::cpu || options.voxelize.distance)
+        return nullptr;
     std::error_code error;
     const std::uintmax_t bytes = std::filesystem::file_size(options.input, error);
     if (error) return nullptr; // the model cannot be read either
@@ -61,6 +65,13 @@ template <class Volume>
 std::vector<std::filesystem::path> write_output(Volume& voxels, const command_line& options,
                                                 const std::filesystem::path& output, const write_options& how) {
     std::vector<channel> aside;
+    if constexpr (std::is_same_v<Volume, volume>)
+        if (options.voxelize.distance && shows_level(output)) {
+            add_level(voxels, options.voxelize.distance->iso.value_or(0));
+            std::vector<std::filesystem::path> files = write_to(voxels, output, how);
+            voxels.channels.pop_back();
+            return files;
+        }
     if (const format* const f = find_format(output); f->all_channels && !f->needs_occupancy)
         while (aside.size() < options.implied.size()) {
             aside.push_back(std::move(voxels.channels.back()));
@@ -105,8 +116,10 @@ scene load_whole(const std::filesystem::path& file, const load_options& options,
 // A flood that has not been examined, in a grid that the model leaves.
 void warn_of_part(const bounding_box& bounds, run_report& report) {
     const voxelize_request& request = report.request;
-    if (!request.solid || request.solid->rule != solid_rule::exterior) return;
-    if (report.stats.solid && report.stats.solid->is_examined) return;
+    const bool is_flooded = request.solid      ? request.solid->rule == solid_rule::exterior
+                            : request.distance ? request.distance->sign.rule == solid_rule::exterior
+                                               : false;
+    if (!is_flooded || (report.stats.solid && report.stats.solid->is_examined)) return;
     const glm::dvec3 first = request.grid.part_origin(),
                      last = first + glm::dvec3(request.grid.extent) * request.grid.voxel_size;
     if (!bounding_box{first, last, false}.holds(bounds))
@@ -188,15 +201,18 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
         throw error;
     };
     const std::uint64_t elements = stream ? stream->num_triangles() : model.triangle_count() + model.line_count();
-    if (elements == 0) refuse("there are no triangles, lines or points to voxelize");
+    const bool may_be_empty = options.voxelize.distance && options.grid.origin; // a grid that needs no model
+    if (elements == 0 && !may_be_empty) refuse("there are no triangles, lines or points to voxelize");
     if (!stream && model.triangle_count() == 0 && options.voxelize.solid)
         refuse("there are only lines and points, which enclose nothing: --solid needs triangles");
     if (elements > UINT32_MAX)
         refuse("there are " + std::to_string(elements) + " triangles, lines and points, more than the " +
                std::to_string(UINT32_MAX) + " that can be numbered");
     const bounding_box bounds = stream ? boxes.placed : bounds_of(model, options.voxelize.threads);
-    if (bounds.empty) refuse("nothing to voxelize has a corner at a finite position");
+    if (bounds.empty && !may_be_empty) refuse("nothing to voxelize has a corner at a finite position");
     report.request.grid = place_grid(options.grid, bounds);
+    if (report.request.distance && report.request.distance->at_corners)
+        report.request.grid = report.request.grid.at_corners();
     report.request.padding = options.grid.padding;
     if (stream) {
         const std::size_t known = stream->warnings().size();
@@ -233,7 +249,9 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
                                                    options.write));
         return bytes;
     };
-    if (!stream) {
+    if (report.request.distance) {
+        storage = {false, false, ""};
+    } else if (!stream) {
         storage.sparse = false;
         // As it is without the other outputs and what they ask for.
         voxelize_request alone = report.request;
@@ -246,7 +264,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     if (!options.quiet && !storage.reason.empty())
         std::cerr << "voxelize: a sparse grid of " << extent.x << " x " << extent.y << " x " << extent.z
                   << " voxels: " << storage.reason << '\n';
-    bar.start(storage.sparse ? "voxelizing into bricks" : "voxelizing");
+    bar.start(report.request.distance ? "measuring" : storage.sparse ? "voxelizing into bricks" : "voxelizing");
     report.request.progress = [&bar](double done) { bar.show(done); };
     volume voxels;
     sparse_volume bricks;
@@ -254,6 +272,8 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
         bricks = run_streamed_voxelizer(*stream, place, report.request, report.stats);
     else if (storage.sparse)
         bricks = run_sparse_voxelizer(std::move(model), report.request, place.folder, report.stats);
+    else if (report.request.distance)
+        voxels = run_distance_voxelizer(std::move(model), report.request, report.stats);
     else
         voxels = run_voxelizer(std::move(model), report.request, report.stats);
     helps_to_stream = false;
@@ -261,8 +281,10 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     for (const std::string& warning : report.stats.warnings) report.warnings.push_back(warning);
     warn_of_dropped(report);
     warn_of_part(bounds, report);
-    if (report.stats.voxels == 0)
+    if (report.stats.voxels == 0 && !report.request.distance)
         report.warnings.push_back(why_empty(report.stats, report.request, bounds.low, bounds.high));
+    else if (report.stats.voxels == 0 && report.stats.triangles > report.stats.triangles_dropped)
+        report.warnings.push_back("no sample of the grid lies within the band of --distance around the model");
 
     start = clock::now();
     for (const std::filesystem::path& output : options.outputs) {
@@ -295,7 +317,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
 // than LOADED_ROOM when it is loaded, on the CPU. folder: for temporary files. Throws as open_stream() does.
 opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder, double loaded_room) {
     const voxelize_request& request = options.voxelize;
-    const bool is_drawn_here = request.backend != backend_choice::cuda &&
+    const bool is_drawn_here = !request.distance && request.backend != backend_choice::cuda &&
                                request.strategy == voxelpipe::strategy::automatic &&
                                options.storage != storage_choice::dense;
     if (!is_drawn_here) return {};

@@ -12,6 +12,7 @@
 #include "write/formats/png.hpp"
 #include "write/formats/progress.hpp"
 #include "write/formats/voxel_shape.hpp"
+#include "write/level_set.hpp"
 #include "write/page/page.hpp"
 
 #include <voxelpipe/sparse/host_sparse.hpp>
@@ -134,12 +135,26 @@ void add_channel(nanovdb_file& file, const sparse_volume& v, const channel& c, c
         add_grid<std::uint32_t>(file, v, c, name, table, rank_of);
     else if (c.type == scalar::i32 && c.components == 1)
         add_grid<std::int32_t>(file, v, c, name, table, rank_of);
+    else if (c.type == scalar::i64 && c.components == 1)
+        add_grid<std::int64_t>(file, v, c, name, table, rank_of);
     else if (c.type == scalar::f32 && c.components == 1)
         add_grid<float>(file, v, c, name, table, rank_of);
     else if (c.type == scalar::f32 && c.components == 3)
         add_grid<glm::vec3>(file, v, c, name, table, rank_of);
     else
         throw write_error(path, ".nvdb has no type for the values of channel " + c.name);
+}
+
+std::vector<std::filesystem::path> write_grids(const nanovdb_file& file, const std::filesystem::path& path,
+                                               const write_options& options) {
+    output_file out(path);
+    progress_meter meter(options.progress, file.size());
+    file.write([&](const void* bytes, std::size_t count) {
+        out.write(std::span{static_cast<const std::byte*>(bytes), count});
+        meter.advance(count);
+    });
+    out.commit();
+    return {path};
 }
 
 std::vector<std::filesystem::path> write_nvdb(const sparse_volume& v, const std::filesystem::path& path,
@@ -158,14 +173,31 @@ std::vector<std::filesystem::path> write_nvdb(const sparse_volume& v, const std:
                 file, v, c, c.name + "." + std::to_string(n + 1), slabs[n].table(v),
                 [&slab = slabs[n]](std::uint64_t rank) { return slab.rank_in_volume(rank); }, path);
     }
-    output_file out(path);
-    progress_meter meter(options.progress, file.size());
-    file.write([&](const void* bytes, std::size_t count) {
-        out.write(std::span{static_cast<const std::byte*>(bytes), count});
-        meter.advance(count);
-    });
-    out.commit();
-    return {path};
+    return write_grids(file, path, options);
+}
+
+// The distances of a field, as a level set where they are one.
+void add_distances(nanovdb_file& file, const band_bricks& b, const channel& c) {
+    const float* const values = reinterpret_cast<const float*>(c.data.data());
+    nanovdb::source<float> grid{c.name, b.band.table(), grid_of(b.band.shape), b.background,
+                                [values](std::uint64_t rank) { return values[rank]; }};
+    grid.meaning = b.is_level_set ? nanovdb::grid_class::level_set : nanovdb::grid_class::unknown;
+    if (b.is_level_set) {
+        grid.inside = b.inside.data();
+        grid.table.tiles = b.in_inside.data();
+        grid.table.num_tiles = b.in_inside.size();
+    }
+    file.add<float>(std::move(grid));
+}
+
+// What readers of level sets should know of a field.
+void warn_of_band(const volume& v, const std::filesystem::path& path, const write_options& options) {
+    if (!options.warn) return;
+    if (v.distances->is_signed && !are_cubic(v.voxel_size))
+        options.warn("\"" + path.string() +
+                     "\": level sets have cubic voxels, and this grid's are not: its class is unknown");
+    else if (const std::string warning = cut_band_warning(v); !warning.empty())
+        options.warn("\"" + path.string() + "\": " + warning);
 }
 
 // ---- .npz and .npy
@@ -289,13 +321,28 @@ bool is_sparse_format(const std::filesystem::path& path) {
 
 std::vector<std::filesystem::path> write_nvdb(const volume& v, const std::filesystem::path& path,
                                               const write_options& options) {
-    return write_nvdb(make_sparse(v, options.threads), path, options);
+    if (!v.distances) return write_nvdb(make_sparse(v, options.threads), path, options);
+    const band_bricks bricks = find_band(v, options.threads);
+    nanovdb_file file;
+    for (const channel& c : bricks.band.channels) {
+        if (c.name == "distance")
+            add_distances(file, bricks, c);
+        else
+            add_channel(
+                file, bricks.band, c, c.name, bricks.band.table(), [](std::uint64_t rank) { return rank; }, path);
+    }
+    std::vector<std::filesystem::path> files = write_grids(file, path, options);
+    warn_of_band(v, path, options);
+    return files;
 }
 
 #ifdef VOXELIZE_HAS_OPENVDB
 std::vector<std::filesystem::path> write_vdb(const volume& v, const std::filesystem::path& path,
                                              const write_options& options) {
-    return write_vdb(make_sparse(v, options.threads), path, options);
+    if (!v.distances) return write_vdb(make_sparse(v, options.threads), path, options);
+    std::vector<std::filesystem::path> files = write_vdb(find_band(v, options.threads), path, options);
+    warn_of_band(v, path, options);
+    return files;
 }
 #endif
 

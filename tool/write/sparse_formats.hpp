@@ -24,7 +24,8 @@ std::vector<std::filesystem::path> write_sparse(const sparse_volume& v, const st
                                                 const write_options& options);
 
 #ifdef VOXELIZE_HAS_OPENVDB
-// The occupied voxels of a dense volume as .vdb.
+// The occupied voxels of a dense volume as .vdb; of a distance field the band, as a level set where it is one
+// (level_set.hpp).
 std::vector<std::filesystem::path> write_vdb(const volume& v, const std::filesystem::path& path,
                                              const write_options& options);
 #endif

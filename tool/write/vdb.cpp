@@ -143,9 +143,38 @@ void add_count(openvdb::GridPtrVec& grids, const sparse_volume& v, const channel
             v, c.name, 0, [&](std::uint64_t rank) { return static_cast<std::int64_t>(counts(rank)); }));
 }
 
-openvdb::GridPtrVec grids_of(const sparse_volume& v, const std::filesystem::path& path, progress_meter& meter) {
+// The distances of a field: beyond its band plus or minus the background, not active.
+openvdb::GridBase::Ptr distance_grid(const band_bricks& b, const channel& c) {
+    const openvdb::GridBase::Ptr made =
+        make_grid<openvdb::FloatGrid>(b.band, c.name, b.background, values_of<float>(c));
+    if (!b.is_level_set) return made;
+    const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(made);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    auto accessor = grid->getAccessor();
+    for (std::size_t n = 0; n < b.inside.size(); ++n) {
+        const glm::ivec3 origin = voxelpipe::core::morton_position(b.band.keys[n]) * 8;
+        for (unsigned bit = 0; bit < 512; ++bit) {
+            if (!b.inside[n].has(bit)) continue;
+            const glm::ivec3 p = origin + voxelpipe::core::morton_position(bit);
+            accessor.setValueOff(openvdb::Coord(p.x, p.y, p.z), -b.background);
+        }
+    }
+    for (const voxelpipe::brick_tile& tile : b.in_inside) {
+        const glm::ivec3 low = tile.origin(), high = low + (tile.side() - 1);
+        grid->tree().sparseFill(openvdb::CoordBBox(low.x, low.y, low.z, high.x, high.y, high.z), -b.background, false);
+    }
+    return grid;
+}
+
+openvdb::GridPtrVec grids_of(const sparse_volume& v, const std::filesystem::path& path, progress_meter& meter,
+                             const band_bricks* field) {
     openvdb::GridPtrVec grids;
     for (const channel& c : v.channels) {
+        if (field != nullptr && c.name == "distance") {
+            grids.push_back(distance_grid(*field, c));
+            meter.advance(1);
+            continue;
+        }
         const std::uint32_t empty = empty_value(c);
         if (c.type == scalar::bit) {
             grids.push_back(make_grid<openvdb::MaskGrid>(v, c.name, false, [](std::uint64_t) { return true; }));
@@ -156,6 +185,8 @@ openvdb::GridPtrVec grids_of(const sparse_volume& v, const std::filesystem::path
         } else if (c.type == scalar::i32 && c.components == 1) {
             grids.push_back(
                 make_grid<openvdb::Int32Grid>(v, c.name, static_cast<std::int32_t>(empty), values_of<std::int32_t>(c)));
+        } else if (c.type == scalar::i64 && c.components == 1) {
+            grids.push_back(make_grid<openvdb::Int64Grid>(v, c.name, -1, values_of<std::int64_t>(c)));
         } else if (c.type == scalar::f32 && c.components == 1) {
             grids.push_back(
                 make_grid<openvdb::FloatGrid>(v, c.name, voxelpipe::core::bit_cast<float>(empty), values_of<float>(c)));
@@ -170,10 +201,8 @@ openvdb::GridPtrVec grids_of(const sparse_volume& v, const std::filesystem::path
     return grids;
 }
 
-} // namespace
-
-std::vector<std::filesystem::path> write_vdb(const sparse_volume& v, const std::filesystem::path& path,
-                                             const write_options& options) {
+std::vector<std::filesystem::path> write_grids(const sparse_volume& v, const std::filesystem::path& path,
+                                               const write_options& options, const band_bricks* field) {
     openvdb::initialize();
     progress_meter meter(options.progress, v.channels.size() + 1);
     output_file out(path);
@@ -181,13 +210,25 @@ std::vector<std::filesystem::path> write_vdb(const sparse_volume& v, const std::
     {
         std::ostream stream(&buffer);
         stream.exceptions(std::ios_base::badbit); // what the file throws passes through
-        openvdb::io::Stream(stream).write(grids_of(v, path, meter));
+        openvdb::io::Stream(stream).write(grids_of(v, path, meter, field));
     }
     out.seek(id_at);
     out.write(buffer.id());
     out.commit();
     meter.advance(1);
     return {path};
+}
+
+} // namespace
+
+std::vector<std::filesystem::path> write_vdb(const sparse_volume& v, const std::filesystem::path& path,
+                                             const write_options& options) {
+    return write_grids(v, path, options, nullptr);
+}
+
+std::vector<std::filesystem::path> write_vdb(const band_bricks& field, const std::filesystem::path& path,
+                                             const write_options& options) {
+    return write_grids(field.band, path, options, &field);
 }
 
 } // namespace voxelize

@@ -9,6 +9,7 @@
 
 #include "model/sparse_volume.hpp"
 #include "write/formats/formats.hpp"
+#include "write/level_set.hpp"
 
 #include <filesystem>
 #include <vector>
@@ -17,6 +18,10 @@ namespace voxelize {
 
 // Throws write_error.
 std::vector<std::filesystem::path> write_vdb(const sparse_volume& v, const std::filesystem::path& path,
+                                             const write_options& options);
+
+// The band of a distance field, its distances as a level set where they are one; other channels as above.
+std::vector<std::filesystem::path> write_vdb(const band_bricks& field, const std::filesystem::path& path,
                                              const write_options& options);
 
 } // namespace voxelize

@@ -27,9 +27,9 @@ struct band {
     double voxels = 3.0;   // above 0, finite
     bool is_whole = false; // every sample holds its distance
 
-    constexpr band() = default;
+    constexpr band() = default;                                           // 3 voxels
     constexpr band(double number_of_voxels) : voxels(number_of_voxels) {} // NOLINT(*-explicit-*): {.band = 5}
-    static const band whole;
+    static const band whole;                                              // every sample holds its distance
     friend bool operator==(const band&, const band&) = default;
 
 private:
@@ -67,7 +67,7 @@ struct distance_options {
 // `primitive` is none, the distance is plus or minus the band's, and all else is 0.
 template <class Varyings = no_varyings>
 struct distance_fragment {
-    static constexpr std::uint32_t none = ~std::uint32_t{0};
+    static constexpr std::uint32_t none = ~std::uint32_t{0}; // no primitive
 
     std::uint32_t triangle;  // in its mesh
     std::uint32_t draw;      // number of the draw in the call
@@ -88,6 +88,7 @@ struct distance_fragment {
 
 // Fragment shader that returns the distance: into one target of float.
 struct distance {
+    // The fragment's distance, also beyond the band.
     template <class Varyings>
     VOXELPIPE_HD output<float> operator()(const distance_fragment<Varyings>& f) const {
         return outputs(f.distance);

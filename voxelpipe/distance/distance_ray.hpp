@@ -10,9 +10,8 @@
 
 #include <glm/vec3.hpp>
 
-#include <algorithm>
 #include <cstddef>
-#include <cstdint>
+#include <type_traits>
 
 namespace voxelpipe {
 

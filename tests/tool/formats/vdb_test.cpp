@@ -11,7 +11,10 @@
 
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
+#include <openvdb/tools/Diagnostics.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 
 using namespace voxelize;
@@ -199,6 +202,52 @@ TEST_F(Vdb, TheSameVolumeIsTheSameBytes) {
     EXPECT_EQ(id("a.vdb"), id("b.vdb"));
     EXPECT_NE(id("a.vdb"), id("c.vdb")); // by which OpenVDB tells files apart
     EXPECT_EQ(36U, id("a.vdb").size());
+}
+
+// A ball of distances: what OpenVDB's own tools expect of a level set, and its values at every voxel.
+TEST_F(Vdb, DistancesAreALevelSet) {
+    constexpr std::int64_t n = 72;
+    constexpr float band = 1.5F;
+    volume v = make_volume({n, n, n});
+    v.voxel_size = {0.5, 0.5, 0.5};
+    v.distances = distance_field{band, true};
+    v.add("distance", scalar::f32);
+    v.add("nearest", scalar::i64);
+    const auto expected = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+        const double a = static_cast<double>(x) - 35.5, b = static_cast<double>(y) - 35.5,
+                     c = static_cast<double>(z) - 35.5;
+        return std::clamp(static_cast<float>(0.5 * std::sqrt(a * a + b * b + c * c) - 14), -band, band);
+    };
+    for (std::int64_t z = 0; z < n; ++z)
+        for (std::int64_t y = 0; y < n; ++y)
+            for (std::int64_t x = 0; x < n; ++x) {
+                store(v.channels[0].data.data() + 4 * v.index(x, y, z), expected(x, y, z));
+                store(v.channels[1].data.data() + 8 * v.index(x, y, z), v.index(x, y, z));
+            }
+    write(v, folder_ / "ball.vdb");
+    const grids found = read(folder_ / "ball.vdb");
+    const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(found.at("distance"));
+    ASSERT_TRUE(grid != nullptr);
+    EXPECT_EQ(openvdb::GRID_LEVEL_SET, grid->getGridClass());
+    EXPECT_EQ(band, grid->background());
+    EXPECT_EQ("", openvdb::tools::checkLevelSet(*grid, 6)); // class, cubes, background, active values within the band
+    const auto values = grid->getConstAccessor();
+    std::uint64_t active = 0;
+    for (std::int64_t z = 0; z < n; ++z)
+        for (std::int64_t y = 0; y < n; ++y)
+            for (std::int64_t x = 0; x < n; ++x) {
+                const openvdb::Coord at(static_cast<int>(x), static_cast<int>(y), static_cast<int>(z));
+                ASSERT_EQ(expected(x, y, z), values.getValue(at)) << at;
+                const bool is_active = std::abs(expected(x, y, z)) < band;
+                ASSERT_EQ(is_active, values.isValueOn(at)) << at;
+                active += is_active ? 1 : 0;
+            }
+    EXPECT_EQ(active, grid->activeVoxelCount());
+    EXPECT_EQ(band, values.getValue(openvdb::Coord(-1, 200, 3)));
+    const auto numbers = openvdb::gridPtrCast<openvdb::Int64Grid>(found.at("nearest"));
+    ASSERT_TRUE(numbers != nullptr);
+    EXPECT_EQ(-1, numbers->background());
+    EXPECT_EQ(active, numbers->activeVoxelCount());
 }
 
 } // namespace

@@ -106,7 +106,7 @@ void slab_passes::add(slab_pass pass, const sparse_volume& drawn) {
         append(found_, drawn.masks);
         return;
     }
-    std::array<color_mean::sums, target_table.size()> sums{};
+    std::array<color_mean::sums, target_count> sums{};
     for (const channel& c : drawn.channels)
         if (const target id = *target_named(c.name); is_color(id))
             add_colors(sums[static_cast<std::size_t>(id)], mean_, c);

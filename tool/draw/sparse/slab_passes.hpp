@@ -94,7 +94,7 @@ private:
     std::size_t flooded_ = ~std::size_t{0}; // the slab
     column_table seen_;                     // along z alone
     color_mean mean_;
-    std::array<color_mean::sums, target_table.size()> sums_{};
+    std::array<color_mean::sums, target_count> sums_{};
     fill_means means_{};
 };
 

@@ -275,6 +275,9 @@ private:
             case target::depth:
                 copy<base::depth, float>(result, wanted, framebuffer);
                 break;
+            case target::distance: // those of --distance alone, which draws no bricks
+            case target::nearest:
+                break;
             }
         }
         return true;

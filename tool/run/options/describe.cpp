@@ -217,6 +217,9 @@ void describe_solids(CLI::App& app, raw_options& raw) {
                  "Inside is what most of the rows along x, y and z say, by whether they crossed the surface an odd "
                  "number of times; open rows abstain")
         ->group("Solids");
+    app.add_flag("--winding", raw.winding,
+                 "Inside is where the generalized winding number is 1/2 or more; not in this version")
+        ->group("Solids");
     app.add_option("--closing", raw.closing,
                    "With --solid exterior: close gaps of about 2 R voxels for the flood. Default: 0")
         ->check(between(0, 64))
@@ -226,6 +229,26 @@ void describe_solids(CLI::App& app, raw_options& raw) {
                    "Colour of the voxels inside: #rrggbb, or mean, that of the surface's voxels. Default: mean")
         ->option_text("COLOUR")
         ->group("Solids");
+}
+
+void describe_distances(CLI::App& app, raw_options& raw) {
+    app.add_flag("--distance", raw.distance,
+                 "Compute the distance of every sample from the model instead, in its units, negative inside; see "
+                 "DISTANCES")
+        ->group("Distances");
+    app.add_option("--band", raw.band,
+                   "Samples further away than N voxels hold that distance, with their sign; whole: none do. Default: 3")
+        ->option_text("N|whole")
+        ->group("Distances");
+    app.add_flag("--unsigned", raw.is_unsigned, "Positive inside, too: a model need not be closed")->group("Distances");
+    app.add_flag("--corners", raw.corners,
+                 "Samples at the corners of the voxels, one more along each axis. Default: at their centres")
+        ->group("Distances");
+    app.add_option("--iso", raw.iso,
+                   "What pictures, meshes and lists of voxels show of distances: those of at most D. Default: 0, the "
+                   "model")
+        ->option_text("D")
+        ->group("Distances");
 }
 
 void describe_machine(CLI::App& app, command_line& options) {
@@ -391,6 +414,7 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
     describe_model(app, options);
     describe_values(app, options, raw);
     describe_solids(app, raw);
+    describe_distances(app, raw);
     describe_machine(app, options);
     describe_picture(app, options, raw);
     describe_output(app, options);

@@ -27,7 +27,7 @@ std::string help_footer() {
         text += "  " + std::string(name) + std::string(name.size() < 16 ? 16 - name.size() : 1, ' ') +
                 std::string(rest) + '\n';
     };
-    for (const target_info& entry : target_table) {
+    for (const target_info& entry : all_targets) {
         std::string type(name_of(entry.type));
         if (entry.components > 1) type += " x " + std::to_string(entry.components);
         line(entry.name,
@@ -57,6 +57,21 @@ std::string help_footer() {
         "  Inside, normal is 0, material and triangle are -1, depth is NaN, count is the number of bodies: 1, with "
         "each_draw\n"
         "  more where they overlap. Alpha masks cut no holes into a solid.\n"
+        "\nDISTANCES (--distance)\n"
+        "  The distance of every sample from the nearest triangle, float32, in the model's units, exact. It is a "
+        "distance "
+        "to\n"
+        "  the mesh: walls inside a union of parts count. Samples are the centres of the voxels, or their corners. "
+        "Negative\n"
+        "  inside, by the rule of --solid (nonzero without) and --close-holes or --vote, which need no --solid here. "
+        "Further\n"
+        "  away than the band of --band N voxels (of the longest side) they hold that distance. color, normal, "
+        "material,\n"
+        "  triangle, depth and nearest are those of the nearest triangle at its closest point, and empty beyond the "
+        "band.\n"
+        "  .nvdb and .vdb hold the band as a level set, if it is signed and voxels are cubes. Formats of voxels show "
+        "those of\n"
+        "  at most --iso. Distances are drawn on the CPU.\n"
         "\nMANY MODELS (--list FILE)\n"
         "  {name} is the name of the model's file without its extension; equal names get -2, -3, ... in the order of "
         "the list.\n"

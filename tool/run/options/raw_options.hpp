@@ -25,6 +25,12 @@ struct raw_options {
     std::string close_holes; // "all", or how many edges
     std::optional<int> closing;
     bool vote = false;
+    bool winding = false;
+    bool distance = false;
+    std::string band; // a number or "whole"
+    bool is_unsigned = false;
+    bool corners = false;
+    std::optional<double> iso;
     std::vector<std::string> targets;
     bool no_edges = false;
     bool no_ground = false;
@@ -40,6 +46,7 @@ void describe(CLI::App& app, command_line& options, raw_options& raw);
 void understand_batch(command_line& options, bool has_world, bool has_rank);
 // Fills OPTIONS from RAW, in this order. They throw usage_error.
 void understand_solid(command_line& options, const raw_options& raw);
+void understand_distance(command_line& options, const raw_options& raw);
 void understand_grid(command_line& options, const raw_options& raw);
 void understand_outputs(command_line& options, const raw_options& raw);
 void understand_picture(command_line& options, const raw_options& raw);

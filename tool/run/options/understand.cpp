@@ -1,15 +1,19 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
+#include "draw/distance/distance_voxelizer.hpp"
 #include "raw_options.hpp"
 #include "values.hpp"
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <initializer_list>
 #include <optional>
+#include <utility>
+#include <vector>
 
 namespace voxelize {
 
@@ -71,7 +75,12 @@ void understand_batch(command_line& options, bool has_world, bool has_rank) {
 
 void understand_solid(command_line& options, const raw_options& raw) {
     if (raw.coverage) options.voxelize.coverage = *raw.coverage;
-    if (!raw.solid) {
+    if (raw.winding)
+        throw usage_error(raw.solid == solid_rule::even_odd
+                              ? "--winding does not go with --solid even_odd"
+                              : "--winding: this version has no repair by winding numbers; --close-holes, --vote and "
+                                "--solid exterior are there");
+    if (!raw.solid && !raw.distance) {
         const std::pair<const char*, bool> given[]{{"--solid-extent", raw.extent_of_solid.has_value()},
                                                    {"--close-holes", !raw.close_holes.empty()},
                                                    {"--vote", raw.vote},
@@ -81,11 +90,11 @@ void understand_solid(command_line& options, const raw_options& raw) {
             if (is_given) throw usage_error(std::string(name) + " goes with --solid");
         return;
     }
-    if (raw.coverage)
+    if (raw.coverage && raw.solid)
         throw usage_error("--solid and --coverage do not go together: a solid's surface is conservative, see "
                           "--solid-extent");
     solid_request& solid = options.voxelize.solid.emplace();
-    solid.rule = *raw.solid;
+    solid.rule = raw.solid.value_or(solid_rule::nonzero);
     solid.extent = raw.extent_of_solid.value_or(solid_extent::outer);
     solid.vote = raw.vote;
     solid.closing = raw.closing.value_or(0);
@@ -113,6 +122,48 @@ void understand_solid(command_line& options, const raw_options& raw) {
     if (raw.fill_color.empty() || lower(raw.fill_color) == "mean") return;
     solid.fill_color = parse_color(raw.fill_color);
     if (!solid.fill_color) throw usage_error("--fill-color takes mean or #rrggbb, not \"" + raw.fill_color + '"');
+}
+
+void understand_distance(command_line& options, const raw_options& raw) {
+    const std::pair<const char*, bool> given[]{{"--band", !raw.band.empty()},
+                                               {"--unsigned", raw.is_unsigned},
+                                               {"--corners", raw.corners},
+                                               {"--iso", raw.iso.has_value()}};
+    if (!raw.distance) {
+        for (const auto& [name, is_given] : given)
+            if (is_given) throw usage_error(std::string(name) + " goes with --distance");
+        return;
+    }
+    distance_request& distance = options.voxelize.distance.emplace();
+    distance.sign = *std::exchange(options.voxelize.solid, std::nullopt);
+    distance.is_signed = !raw.is_unsigned;
+    distance.at_corners = raw.corners;
+    distance.iso = raw.iso;
+    if (raw.is_unsigned && (raw.solid || raw.vote || raw.closing || !raw.close_holes.empty()))
+        throw usage_error("--unsigned has no sign that --solid or a repair could decide: leave out one of them");
+    if (raw.coverage) throw usage_error("--distance and --coverage do not go together: distances cover every sample");
+    if (raw.extent_of_solid) throw usage_error("--solid-extent does not go with --distance: a sample is inside or not");
+    if (!raw.fill_color.empty())
+        throw usage_error("--fill-color does not go with --distance: colours are those of the nearest triangle");
+    if (raw.iso && !std::isfinite(*raw.iso)) throw usage_error("--iso takes a finite distance");
+    if (!raw.band.empty()) {
+        distance.is_whole = lower(raw.band) == "whole";
+        const char* const end = raw.band.data() + raw.band.size();
+        const auto [last, error] = std::from_chars(raw.band.data(), end, distance.band);
+        if (!distance.is_whole &&
+            (error != std::errc{} || last != end || !std::isfinite(distance.band) || !(distance.band > 0)))
+            throw usage_error("--band takes a number of voxels above 0, or whole, not \"" + raw.band + '"');
+        if (distance.is_whole) distance.band = distance_request{}.band;
+    }
+    if (options.storage == storage_choice::sparse)
+        throw usage_error("--sparse does not go with --distance: .nvdb and .vdb hold the band alone");
+    if (options.by_slabs)
+        throw usage_error("--distance is one piece of work: no --resume, and no processes that share a model");
+    if (options.write.levels) throw usage_error("--levels does not go with --distance: distances have no mip levels");
+    if (options.write.pieces != 0)
+        for (const std::filesystem::path& output : options.outputs)
+            if (lower(output.extension().string()) == ".nvdb")
+                throw usage_error("--pieces does not go with --distance and .nvdb: a level set is one grid");
 }
 
 void understand_grid(command_line& options, const raw_options& raw) {
@@ -179,18 +230,30 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     for (const std::string& name : raw.targets) {
         const std::optional<target> id = target_named(lower(name));
         if (!id)
-            throw usage_error("--target \"" + name + "\" is not one of " + names(target_table, &target_info::name));
+            throw usage_error("--target \"" + name + "\" is not one of " + names(all_targets, &target_info::name));
+        if (!options.voxelize.distance && (*id == target::distance || *id == target::nearest))
+            throw usage_error("--target " + lower(name) + " goes with --distance");
+        if (options.voxelize.distance && !is_of_nearest(*id))
+            throw usage_error("--target " + lower(name) +
+                              " does not go with --distance; beside it there are color, normal, material, triangle, "
+                              "depth and nearest, those of the nearest triangle");
         if (std::find(targets.begin(), targets.end(), *id) == targets.end()) targets.push_back(*id);
     }
     for (const target id : targets) {
         const std::string_view name = info_of(id).name;
         const bool held = std::any_of(options.outputs.begin(), options.outputs.end(), [&](const auto& output) {
             const format* const found = find_format(output);
-            return id == target::occupancy || found->all_channels || (found->shows_colors && is_color(id));
+            return id == target::occupancy || id == target::distance || found->all_channels ||
+                   (found->shows_colors && is_color(id));
         });
         if (!held)
             options.warnings.push_back("--target " + std::string(name) +
                                        " is in none of the outputs: their formats hold no such values");
+    }
+    if (options.voxelize.distance) {
+        std::erase(targets, target::distance);
+        targets.insert(targets.begin(), target::distance);
+        needs_occupancy = false; // the level stands for it
     }
     if (targets.empty()) {
         targets.push_back(target::occupancy);

@@ -121,7 +121,8 @@ std::vector<std::filesystem::path> write(const volume& v, const std::filesystem:
     const format& f = known_format(path);
     v.check();
     if (v.channels.empty()) throw write_error(path, "there is no channel to write");
-    if (f.needs_occupancy && v.occupancy() == nullptr)
+    const bool is_band = v.distances && f.only_sparse; // the band stands for it
+    if (f.needs_occupancy && !is_band && v.occupancy() == nullptr)
         throw write_error(path, std::string(f.extension) + " needs the occupancy");
     check_cubes(f, v.voxel_size, path);
     const writer& w = all_writers[number_of(f)];

@@ -97,6 +97,9 @@ void with_rule(const channel& c, const F& f) {
         return f(plain_rule<std::int32_t, reduce::max>{});
     case target::depth:
         return f(plain_rule<float, reduce::min>{});
+    case target::distance: // --levels does not go with it
+    case target::nearest:
+        throw write_error(c.name, "distances have no levels");
     }
 }
 

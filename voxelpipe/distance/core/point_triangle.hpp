@@ -45,7 +45,7 @@ struct distance_scale {
         r.area[i] = exact::mul(r.length[(i + 1) % 3], r.length[(i + 2) % 3]);
         r.g[i] = exact::mul(r.area[i], r.area[i]);
     }
-    double s[3] = {r.length[0], r.length[1], r.length[2]}; // NOLINT(*-avoid-c-arrays)
+    double s[3] = {r.length[0], r.length[1], r.length[2]};
     std::sort(s, s + 3);
     r.c = exact::mul(exact::mul(s[0], s[1]), s[2]);
     return r;
@@ -174,7 +174,7 @@ struct narrow_triangle {
 // volume below 2^126.
 [[nodiscard]] VOXELPIPE_HD inline seen_triangle see_wide(const snapped_position& a, const snapped_position& b,
                                                          const snapped_position& c, const snapped_position& sample) {
-    const triple<std::int64_t> v[3] = {{{a.x - sample.x, a.y - sample.y, a.z - sample.z}}, // NOLINT(*-avoid-c-arrays)
+    const triple<std::int64_t> v[3] = {{{a.x - sample.x, a.y - sample.y, a.z - sample.z}},
                                        {{b.x - sample.x, b.y - sample.y, b.z - sample.z}},
                                        {{c.x - sample.x, c.y - sample.y, c.z - sample.z}}};
     seen_triangle s{};
@@ -261,7 +261,7 @@ closest_weights(const seen_triangle& t, const distance_scale& s, closest_region 
     triple<double> r{{0.0, 0.0, 0.0}};
     const int i = static_cast<int>(region);
     if (region == closest_region::face) {
-        const double side[3] = {face_side(t, s, 0), face_side(t, s, 1), face_side(t, s, 2)}; // NOLINT(*-avoid-c-arrays)
+        const double side[3] = {face_side(t, s, 0), face_side(t, s, 1), face_side(t, s, 2)};
         const double sum = ordered_sum(side[0], side[1], side[2]);
         // Edge k lies opposite of vertex k + 2.
         r[2] = exact::div(side[0], sum);

@@ -28,8 +28,8 @@ namespace voxelpipe::core {
     };
     const int first = side(a, b);
     if (first == 0 || side(b, c) != first || side(c, a) != first) return 0;
-    const std::int64_t e1[3] = {b.x - a.x, b.y - a.y, b.z - a.z}; // NOLINT(*-avoid-c-arrays)
-    const std::int64_t e2[3] = {c.x - a.x, c.y - a.y, c.z - a.z}; // NOLINT(*-avoid-c-arrays)
+    const std::int64_t e1[3] = {b.x - a.x, b.y - a.y, b.z - a.z};
+    const std::int64_t e2[3] = {c.x - a.x, c.y - a.y, c.z - a.z};
     const auto cross = [&](int i, int j) {
         return static_cast<int128>(e1[i]) * e2[j] - static_cast<int128>(e1[j]) * e2[i];
     };

@@ -145,6 +145,7 @@ nanovdb::file_entry nanovdb_file::typed_grid<T>::prepare() {
     upper_.assign(plan_.upper.keys.size(), {});
     all_ = {};
     const auto add_tile = [this](nanovdb::statistics<T>& s, std::uint64_t tile) {
+        if (!nanovdb::has_active_tiles(from_)) return;
         const brick_tile t = from_.table.tiles[tile];
         s.add_cube(nanovdb::tile_value(from_, tile), t.origin(), t.side());
     };
@@ -167,9 +168,9 @@ nanovdb::file_entry nanovdb_file::typed_grid<T>::prepare() {
     nanovdb::file_entry e{};
     e.grid_size = e.file_size = plan_.size;
     e.name_hash = nanovdb::hash_of(from_.name);
-    e.num_voxels = from_.table.num_voxels();
+    e.num_voxels = nanovdb::num_active(from_);
     e.type = nanovdb::value_type<T>::type;
-    e.meaning = nanovdb::value_type<T>::meaning;
+    e.meaning = from_.meaning;
     e.world = nanovdb::world_box_of(nanovdb::map_of(from_.where), all_.voxels, all_.count == 0);
     e.voxels = all_.voxels;
     for (int a = 0; a < 3; ++a) e.voxel_size[a] = from_.where.voxel_size[a];
@@ -178,7 +179,8 @@ nanovdb::file_entry nanovdb_file::typed_grid<T>::prepare() {
     e.node_count[1] = static_cast<std::uint32_t>(lower_.size());
     e.node_count[2] = static_cast<std::uint32_t>(upper_.size());
     e.node_count[3] = 1;
-    for (int i = 0; i < 3; ++i) e.tile_count[i] = static_cast<std::uint32_t>(plan_.num_tiles[i]);
+    if (nanovdb::has_active_tiles(from_))
+        for (int i = 0; i < 3; ++i) e.tile_count[i] = static_cast<std::uint32_t>(plan_.num_tiles[i]);
     e.version = nanovdb::version;
     return e;
 }
@@ -200,7 +202,7 @@ std::vector<std::byte> nanovdb_file::typed_grid<T>::head() const {
     g.map = map_of(from_.where);
     g.world = world_box_of(g.map, all_.voxels, all_.count == 0);
     for (int a = 0; a < 3; ++a) g.voxel_size[a] = from_.where.voxel_size[a];
-    g.meaning = value_type<T>::meaning;
+    g.meaning = from_.meaning;
     g.type = value_type<T>::type;
     tree_data t{};
     if (from_.table.count != 0) t.node_offset[0] = plan_.first_leaf - sizeof(grid_data);
@@ -210,8 +212,9 @@ std::vector<std::byte> nanovdb_file::typed_grid<T>::head() const {
     t.node_count[0] = static_cast<std::uint32_t>(from_.table.count);
     t.node_count[1] = static_cast<std::uint32_t>(lower_.size());
     t.node_count[2] = static_cast<std::uint32_t>(upper_.size());
-    for (int i = 0; i < 3; ++i) t.tile_count[i] = static_cast<std::uint32_t>(plan_.num_tiles[i]);
-    t.num_voxels = from_.table.num_voxels();
+    if (has_active_tiles(from_))
+        for (int i = 0; i < 3; ++i) t.tile_count[i] = static_cast<std::uint32_t>(plan_.num_tiles[i]);
+    t.num_voxels = num_active(from_);
     root_type root;
     std::memset(static_cast<void*>(&root), 0, sizeof(root)); // padding too
     root.voxels = all_.voxels;
@@ -226,7 +229,7 @@ std::vector<std::byte> nanovdb_file::typed_grid<T>::head() const {
         const auto& child = plan_.root_children[i];
         tile.key = child.key;
         if (child.is_tile) {
-            tile.state = 1; // active
+            tile.state = has_active_tiles(from_) ? 1 : 0; // active
             tile.value = tile_value(from_, child.number);
         } else {
             tile.child =

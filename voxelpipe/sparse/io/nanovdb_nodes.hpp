@@ -18,6 +18,7 @@
 #include <cstring>
 #include <functional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace voxelpipe::io::nanovdb {
@@ -67,7 +68,31 @@ struct source {
     grid where;                                               // the map from indices to the world
     stored_value<T> background{};                             // what absent voxels read as
     std::function<stored_value<T>(std::uint64_t rank)> value; // of a voxel that exists
+    grid_class meaning = value_type<T>::meaning;
+    // A level set: `meaning` says so, and `inside` has a mask for each brick, of voxels that read as -background unless
+    // they exist; a brick of the table may be empty then. The table's tiles are cubes of such voxels, which are not
+    // active: `value` is not asked for them. Numbers alone; not owned, has to stay until write().
+    const brick_mask* inside = nullptr;
 };
+
+// Tiles are active but in level sets.
+template <class T>
+[[nodiscard]] bool has_active_tiles(const source<T>& from) {
+    return from.inside == nullptr;
+}
+// The active voxels of a grid.
+template <class T>
+[[nodiscard]] std::uint64_t num_active(const source<T>& from) {
+    return has_active_tiles(from) ? from.table.num_voxels() : from.table.num_in_bricks();
+}
+// What a voxel inside a level set reads as, beyond its band.
+template <class T>
+[[nodiscard]] stored_value<T> inside_value(const source<T>& from) {
+    if constexpr (std::is_floating_point_v<stored_value<T>>)
+        return -from.background;
+    else
+        return from.background;
+}
 
 template <class T>
 [[nodiscard]] statistics<T> leaf_statistics(const source<T>& from, std::uint64_t brick) {
@@ -77,6 +102,7 @@ template <class T>
     } else {
         s.count = from.table.offsets[brick + 1] - from.table.offsets[brick];
     }
+    if (s.count == 0) return s; // in a level set
     s.voxels = box_of(from.table.masks[brick], core::morton_position(from.table.keys[brick]) * core::sparse_brick_size);
     return s;
 }
@@ -88,17 +114,19 @@ void fill_leaf(const source<T>& from, std::uint64_t brick, leaf_node<T>& leaf) {
     const glm::ivec3 origin = core::morton_position(from.table.keys[brick]) * core::sparse_brick_size;
     for (int a = 0; a < 3; ++a) {
         // The origin is found by rounding down to multiples of eight.
-        leaf.head.low[a] = s.voxels.low[a];
-        leaf.head.size[a] = static_cast<std::uint8_t>(s.voxels.high[a] - s.voxels.low[a]);
-        VOXELPIPE_ASSERT((s.voxels.low[a] & ~7) == origin[a]);
+        leaf.head.low[a] = s.count == 0 ? origin[a] : s.voxels.low[a];
+        if (s.count != 0) leaf.head.size[a] = static_cast<std::uint8_t>(s.voxels.high[a] - s.voxels.low[a]);
+        VOXELPIPE_ASSERT((leaf.head.low[a] & ~7) == origin[a]);
     }
-    static_cast<void>(origin);
-    leaf.head.flags = 2; // has a box
+    leaf.head.flags = s.count == 0 ? 0 : 2; // has a box
     const brick_mask& mask = from.table.masks[brick];
     std::uint64_t rank = from.table.offsets[brick];
     if constexpr (!std::is_same_v<T, bool> && !std::is_same_v<T, mask_value>) {
         s.write_to(leaf);
         std::fill(std::begin(leaf.values), std::end(leaf.values), from.background);
+        if (from.inside != nullptr)
+            for (unsigned bit = 0; bit < 512; ++bit)
+                if (from.inside[brick].has(bit)) leaf.values[leaf_places[bit]] = inside_value(from);
     }
     for (unsigned w = 0; w < 8; ++w) {
         for (std::uint64_t word = mask.words[w]; word != 0; word &= word - 1, ++rank) {
@@ -121,6 +149,7 @@ inline constexpr int lower_tiles = 0, upper_tiles = 4, root_tiles = 9;
 // The value of a tile; true where the grid has no values.
 template <class T>
 [[nodiscard]] stored_value<T> tile_value(const source<T>& from, std::uint64_t tile) {
+    if (!has_active_tiles(from)) return inside_value(from);
     if constexpr (std::is_same_v<T, mask_value>)
         return true;
     else
@@ -213,7 +242,7 @@ void fill_internal(const statistics<T>& s, const source<T>& from, const level& n
                    const std::uint64_t* keys, int log2_bricks, const Child& child, internal_node<T, Log2Size>& node) {
     std::memset(static_cast<void*>(&node), 0, sizeof(node));
     node.voxels = s.voxels;
-    node.flags = 2; // has voxels
+    node.flags = s.count == 0 ? 0 : 2; // has voxels
     s.write_to(node);
     for (auto& e : node.table) e.value = from.background;
     for (std::uint64_t i = nodes.first[number]; i < nodes.first[number + 1]; ++i) {
@@ -226,7 +255,7 @@ void fill_internal(const statistics<T>& s, const source<T>& from, const level& n
         const stored_value<T> value = tile_value(from, nodes.tiles[i]);
         for (std::uint64_t key = tile.first() >> (3 * log2_bricks); key < tile.end() >> (3 * log2_bricks); ++key) {
             const std::size_t n = place_in_node<Log2Size>(key);
-            node.value_mask[n / 64] |= std::uint64_t{1} << (n % 64);
+            if (has_active_tiles(from)) node.value_mask[n / 64] |= std::uint64_t{1} << (n % 64);
             node.table[n].value = value;
         }
     }

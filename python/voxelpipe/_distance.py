@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from ._core import Grid
+from ._device import DeviceMesh
+from ._fit import fit
+from ._mesh import Mesh, MeshLike, as_mesh
+from ._solid import OpenMeshWarning
+from ._surface import take_counts
+
+
+def _host_mesh(mesh: MeshLike) -> Mesh:
+    m = as_mesh(mesh)
+    if isinstance(m, DeviceMesh):
+        raise TypeError("distances are computed on the CPU: copy the mesh to the host, as with .cpu() or .get()")
+    return m
+
+
+def _warn_of_holes(counts: dict[str, int], rows: str, repair: str) -> None:
+    if counts["open_rows"] and repair in ("none", "close_holes"):
+        warnings.warn(
+            f"the mesh is not closed: {counts['open_rows']}{rows} do not balance, and the sign behind a hole is in doubt; "
+            'repair="close_holes", "exterior" or "vote" may help, or sign="unsigned"',
+            OpenMeshWarning,
+            stacklevel=3,
+        )
+
+
+def distance(
+    mesh: MeshLike,
+    grid: Grid,
+    band: float | str = 3,
+    sign: str = "nonzero",
+    *,
+    repair: str = "none",
+    closing: int = 0,
+    bodies: str = "all",
+    max_hole_edges: int | None = None,
+    corners: bool = False,
+    nearest: bool = False,
+    threads: int = 0,
+    status: dict[str, int] | None = None,
+) -> Any:
+    """The distance of every sample from the nearest triangle: float32, (nz, ny, nx), in the mesh's units.
+
+    It is exact: the float nearest to the distance from the snapped triangles, but for a share of 2^-25 of its last place.
+    It is a distance to the mesh: where parts overlap, walls inside their union count.
+
+    band: samples further away than this many voxels (of the largest side) hold that distance, with their sign; "whole":
+        every sample holds its own, and a mesh without triangles gives infinity.
+    sign: what is inside and negative, as `fill` of solid(): "nonzero", "even_odd" or "positive"; "unsigned": nothing is.
+    repair, closing, bodies, max_hole_edges: as in solid(), for the sign; not with "unsigned". Distances are those of the
+        mesh as it is.
+    corners: samples at the corners of the voxels, one more along each axis, in place of their centres: sample [k, j, i]
+        lies at origin + (i, j, k) * voxel_size.
+    nearest: also returns the number of the nearest triangle, int64, of those with the same distance the first; of a list
+        of meshes they are numbered through. -1 beyond the band.
+    threads: 0 takes all cores. The result is the same for any number.
+    status: a dict that is filled with the call's counters, band_samples and those of solid() among them.
+
+    Returns the distances, or (distances, nearest). A mesh of torch's tensors gives tensors. Warns with OpenMeshWarning
+    where rows of samples prove that the mesh is not closed. Raises ValueError for a band that is not above 0 or not
+    finite, IndexError for a triangle that names a vertex that does not exist, TypeError for a mesh in a GPU's memory.
+    """
+    if isinstance(band, str):
+        if band != "whole":
+            raise ValueError(f'band is a number of voxels or "whole", not {band!r}')
+        voxels = 0.0
+    else:
+        voxels = float(band)
+        if not (math.isfinite(voxels) and voxels > 0):
+            raise ValueError(f"band is a number of voxels above 0, or \"whole\", not {band!r}")
+    m = _host_mesh(mesh)
+    positions, where = m.positions(grid)
+    shape = tuple(n + corners for n in grid.shape)
+    out = np.empty(shape, np.float32)
+    numbers = np.empty(shape, np.int64) if nearest else None
+    counts = _core.distance_field(
+        positions,
+        m.triangles,
+        list(m.first_triangles),
+        where,
+        voxels,
+        sign,
+        repair,
+        bodies,
+        max_hole_edges,
+        closing,
+        corners,
+        out,
+        numbers,
+        threads,
+    )
+    take_counts(counts, status)
+    _warn_of_holes(counts, f" of {shape[0] * shape[1]} rows of samples", repair)
+    if numbers is None:
+        return m.to_caller(out)
+    return m.to_caller(out), m.to_caller(numbers)
+
+
+def distance_at(
+    mesh: MeshLike,
+    points: Any,
+    grid: Grid | None = None,
+    sign: str = "nonzero",
+    *,
+    repair: str = "none",
+    bodies: str = "all",
+    max_hole_edges: int | None = None,
+    nearest: bool = False,
+    threads: int = 0,
+    status: dict[str, int] | None = None,
+) -> Any:
+    """The distances of any points (n, 3) from the mesh: float32, (n,), in the mesh's units.
+
+    Points and triangles are snapped to the lattice of `grid`, wherever they lie; by default a grid of 1024 voxels along the
+    mesh's longest side, whose lattice is finer than 2^-23 of that. Otherwise as distance() with band="whole".
+
+    sign, repair, bodies, max_hole_edges: as in distance(); repair is "none" or "close_holes".
+    nearest: also returns the number of each point's nearest triangle, int64.
+    status: a dict that is filled with the call's counters; bad_points are those that are not finite or too far from the
+        grid. They get NaN and -1.
+
+    Returns the distances, or (distances, nearest). A mesh of torch's tensors gives tensors.
+    """
+    m = _host_mesh(mesh)
+    at = m.take(points, "the array of points")
+    if at.ndim != 2 or at.shape[1] != 3:
+        raise ValueError(f"points are an array (n, 3), not {at.shape}")
+    if at.dtype.kind not in "fiu":
+        raise ValueError(f"points are numbers, not {at.dtype}")
+    chosen = grid if grid is not None else fit(mesh, 1024)
+    positions, where = m.positions(chosen)
+    with np.errstate(over="ignore", invalid="ignore"):
+        if positions is not m.vertices:  # relative to the grid's origin
+            at = at.astype(np.float64) - np.asarray(chosen._whole_origin)
+        single = np.ascontiguousarray(at, np.float32)
+    out = np.empty(len(at), np.float32)
+    numbers = np.empty(len(at), np.int64)
+    counts = _core.distance_at(
+        positions,
+        m.triangles,
+        list(m.first_triangles),
+        where,
+        single,
+        sign,
+        repair,
+        bodies,
+        max_hole_edges,
+        out,
+        numbers,
+        threads,
+    )
+    take_counts(counts, status)
+    _warn_of_holes(counts, " rows through points", repair)
+    if not nearest:
+        return m.to_caller(out)
+    return m.to_caller(out), m.to_caller(numbers)
