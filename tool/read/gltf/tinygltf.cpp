@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // The one translation unit that compiles tinygltf and stb_image, as small as they go: tinygltf without file system and
-// pictures (TINYGLTF_* definitions of the target), stb_image with the two formats that glTF knows and two of older models.
+// pictures (TINYGLTF_* definitions of the target), stb_image with the two formats that glTF knows and two of older
+// models.
 #define TINYGLTF_IMPLEMENTATION
 #define STB_IMAGE_IMPLEMENTATION
 #include <nlohmann/json.hpp>

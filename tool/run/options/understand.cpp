@@ -229,8 +229,7 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     targets.clear();
     for (const std::string& name : raw.targets) {
         const std::optional<target> id = target_named(lower(name));
-        if (!id)
-            throw usage_error("--target \"" + name + "\" is not one of " + names(all_targets, &target_info::name));
+        if (!id) throw usage_error("--target \"" + name + "\" is not one of " + names(all_targets, &target_info::name));
         if (!options.voxelize.distance && (*id == target::distance || *id == target::nearest))
             throw usage_error("--target " + lower(name) + " goes with --distance");
         if (options.voxelize.distance && !is_of_nearest(*id))
