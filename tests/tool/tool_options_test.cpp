@@ -266,7 +266,7 @@ TEST(Tool, MergeAndPointsChangeTheFilesThatTheyName) {
         EXPECT_EQ(0, result.code) << result.err;
         return std::filesystem::file_size(out);
     };
-    for (const char* extension : {".glb", ".obj", ".ply"})
+    for (const char* extension : {".glb", ".obj", ".ply", ".stl"})
         EXPECT_LT(10 * size(extension, {"--merge"}), size(extension, {})) << extension;
     EXPECT_EQ(size(".xyz", {"--merge"}), size(".xyz", {}));
     EXPECT_NE(size(".ply", {"--points"}), size(".ply", {}));

@@ -231,8 +231,8 @@ TEST(Solid, EveryFormatHoldsTheInside) {
     add_box(file, {0, 0, 0}, {6, 6, 6});
     file.write_glb(folder / "m.glb");
     std::vector<std::string> all{folder / "m.glb", "-s", "1", "--solid", "nonzero", "--image-size", "64x48"};
-    const std::vector<std::string> names{"a.npy",  "a.npz", "a.vox", "a.schem", "a.binvox", "a.vti",
-                                         "a.nrrd", "a.glb", "a.obj", "a.ply",   "a.xyz",    "a.png"};
+    const std::vector<std::string> names{"a.npy", "a.npz", "a.vox", "a.schem", "a.binvox", "a.vti", "a.nrrd",
+                                         "a.glb", "a.obj", "a.ply", "a.xyz",   "a.png",    "a.stl"};
     for (const std::string& name : names) all.insert(all.end(), {"-o", folder / name});
     const outcome result = run(folder, all);
     ASSERT_EQ(0, result.code) << result.err;

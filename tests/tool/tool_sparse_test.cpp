@@ -162,7 +162,8 @@ TEST(ToolSparse, WritesTheSameShapesAsADenseRun) {
     const char* const several = gltf_test::is_slow_build() ? "70" : "270"; // one model and several
     const std::vector<std::vector<std::string>> runs{
         {"-r", several, "--coverage", "thin", "--up", "z", "-o", "$.vox"},
-        {"-r", "61", "--merge", "--up", "z", "-o", "$.glb", "-o", "$.obj", "-o", "$.ply", "-o", "$.schem"},
+        {"-r", "61", "--merge", "--up", "z", "-o", "$.glb", "-o", "$.obj", "-o", "$.ply", "-o", "$.stl", "-o",
+         "$.schem"},
         {"-r", "50", "--points", "-t", "occupancy", "-o", "$.ply", "-o", "$.vox", "-o", "$.xyz"},
         {"-r", "50", "--solid", "exterior", "-t", "occupancy", "-o", "$.glb", "-o", "$.binvox", "-o", "$.schem", "-o",
          "$.nrrd"}};

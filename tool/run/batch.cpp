@@ -366,7 +366,7 @@ int run_batch(const command_line& options) {
     // Names that only the grid of a model tells, of meshes in several files, are compared once it is known.
     const bool may_split = std::any_of(options.outputs.begin(), options.outputs.end(), [](const fs::path& output) {
         const std::string extension = lower_extension(output);
-        return extension == ".obj" || extension == ".ply" || extension == ".glb";
+        return extension == ".obj" || extension == ".ply" || extension == ".glb" || extension == ".stl";
     });
     if (!may_split) known.reset();
     const manifest records(own_manifest);

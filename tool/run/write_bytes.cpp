@@ -48,6 +48,9 @@ double bytes_of_picture(const preview_options& options) {
 // Text of a vertex with its colour, and of a voxel, in strings that grow.
 constexpr double of_line_of_mesh = 75, of_line_of_point = 40;
 
+// Bytes of a triangle of .stl, in strings that grow.
+constexpr double of_triangle_of_stl = 100;
+
 // A count and an index for each colour of 24 bits.
 constexpr double bytes_of_palette = 80 << 20;
 
@@ -78,16 +81,18 @@ double bytes_to_write(const std::filesystem::path& output, const expected_result
         voxels += result.in_tiles;
         bytes += (brick_bytes + source_bytes) * bricks + values.all * voxels;
     }
-    const bool shows_shape = is_one_of(extension, {".vox", ".schem", ".binvox", ".glb", ".obj", ".ply", ".xyz"});
+    const bool shows_shape =
+        is_one_of(extension, {".vox", ".schem", ".binvox", ".glb", ".obj", ".ply", ".stl", ".xyz"});
     if (!result.is_sparse && (shows_shape || is_one_of(extension, {".html", ".nvdb", ".vdb"}))) {
         constexpr double found_bytes = 90; // the bricks of each layer before they are sorted
         bytes += (brick_bytes + found_bytes) * bricks;
         if (!shows_shape) bytes += values.all * voxels;
     }
-    if (is_one_of(extension, {".glb", ".obj"}) || (extension == ".ply" && !options.points))
+    if (is_one_of(extension, {".glb", ".obj", ".stl"}) || (extension == ".ply" && !options.points))
         bytes += bytes_of_mesh(result, voxels, threads);
     constexpr double items_at_once = 4 * 32768; // formatted by each thread
     if (extension == ".obj") bytes += of_line_of_mesh * std::min(2 * voxels, threads * items_at_once);
+    if (extension == ".stl") bytes += of_triangle_of_stl * std::min(4 * voxels, threads * items_at_once);
     if (extension == ".xyz") bytes += of_line_of_point * std::min(voxels, threads * items_at_once);
     const bool has_colors = std::any_of(result.targets.begin(), result.targets.end(), is_color);
     if (extension == ".vox" && has_colors) bytes += bytes_of_palette;

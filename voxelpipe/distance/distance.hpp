@@ -63,8 +63,8 @@ struct distance_options {
 };
 
 // The triangle that is nearest to a sample: of those with the least distance, as a square in double, the first by draw,
-// instance and triangle. Beyond the band there is none: in_band is false, `triangle`, `draw` and `instance` are 0,
-// `primitive` is none, the distance is plus or minus the band's, and all else is 0.
+// instance and triangle. Beyond the band no triangle is named: in_band is false, `triangle`, `draw` and `instance` are
+// 0, `primitive` is none, the distance is plus or minus the band's, and all else is 0.
 template <class Varyings = no_varyings>
 struct distance_fragment {
     static constexpr std::uint32_t none = ~std::uint32_t{0}; // no primitive

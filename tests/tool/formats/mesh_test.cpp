@@ -4,8 +4,13 @@
 #include "../slow_build.hpp"
 #include "test_volumes.hpp"
 #include "write/formats/formats.hpp"
+#include "write/formats/stl.hpp"
 #include "write/formats/voxel_mesh.hpp"
 
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <iterator>
 #include <map>
 #include <set>
 
@@ -63,6 +68,52 @@ TEST_F(Mesh, MergingKeepsColoursApart) {
     std::map<std::uint32_t, std::uint64_t> by_color;
     for (const voxel_face& f : faces) by_color[f.rgb] += std::uint64_t{f.size[0]} * f.size[1];
     EXPECT_EQ(by_color, (std::map<std::uint32_t, std::uint64_t>{{7, 1 + 3 * 4}, {9, 1 + 4}}));
+}
+
+TEST_F(Mesh, FacesWithoutColoursJoinAcrossThem) {
+    volume v = make_box({4, 1, 1}, {0, 0, 0}, {4, 1, 1});
+    channel& color = v.add("color", scalar::u8, 4);
+    for (std::size_t i = 0; i < 4; ++i) color.data[4 * i] = static_cast<std::byte>(i);
+    for (const voxel_face& face : voxel_faces(voxel_shape(v, 1), false, 1, {}, false)) EXPECT_EQ(face.rgb, 0u);
+    EXPECT_EQ(voxel_faces(voxel_shape(v, 1), true, 1, {}, false).size(), 6u);
+}
+
+TEST_F(Mesh, StlWarnsWhereFloatsJoinItsCorners) {
+    volume v = make_box({4, 2, 2}, {0, 0, 0}, {4, 2, 2});
+    std::vector<std::string> warnings;
+    write_options options;
+    options.warn = [&](const std::string& line) { warnings.push_back(line); };
+    write(v, folder_ / "near.stl", options);
+    EXPECT_TRUE(warnings.empty());
+    v.origin = {431234, 4649776, 100};
+    v.voxel_size = {0.05, 0.05, 0.05}; // the floats there are 0.5 apart along y
+    write(v, folder_ / "far.stl", options);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_NE(warnings[0].find("far.stl"), std::string::npos) << warnings[0];
+    EXPECT_NE(warnings[0].find("floats of .stl"), std::string::npos) << warnings[0];
+    write(v, folder_ / "far.ply", options);
+    EXPECT_EQ(warnings.size(), 1u);
+}
+
+TEST_F(Mesh, StlOfAnyTrianglesHasTheirNormals) {
+    const std::array<stl_triangle, 2> triangles{
+        {{{{0, 0, 0}, {3, 0, 0}, {0, 0, 4}}}, {{{1, 1, 1}, {2, 2, 2}, {3, 3, 3}}}}};
+    const std::function<void(double)> none;
+    progress_meter meter(none, 2);
+    output_file out(folder_ / "any.stl");
+    write_stl_triangles(out, 2, 1, meter, [&](std::size_t n) { return triangles[n]; });
+    out.commit();
+    std::ifstream file(folder_ / "any.stl", std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    ASSERT_EQ(bytes.size(), 84u + 2 * 50);
+    const auto value = [&](std::size_t triangle, std::size_t n) {
+        float f = 0;
+        std::memcpy(&f, bytes.data() + 84 + 50 * triangle + 4 * n, 4);
+        return f;
+    };
+    const std::array<float, 12> first{0, -1, 0, 0, 0, 0, 3, 0, 0, 0, 0, 4};
+    for (std::size_t n = 0; n < 12; ++n) EXPECT_EQ(value(0, n), first[n]) << n;
+    for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(value(1, n), 0.0F) << "a triangle without area has no normal";
 }
 
 TEST_F(Mesh, CornersAreSharedByEqualColours) {

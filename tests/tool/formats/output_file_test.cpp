@@ -176,10 +176,10 @@ TEST_F(OutputFile, RefusesWhatItCannotWrite) {
     v.add("count", scalar::u32);
     const auto message = [&](const char* name) { return message_of([&] { write(v, folder_ / name); }); };
     EXPECT_NE(message("a.abc").find(
-                  ".npy, .npz, .vox, .schem, .binvox, .vti, .pvti, .nrrd, .zarr, .glb, .obj, .ply, .xyz, .png"),
+                  ".npy, .npz, .vox, .schem, .binvox, .vti, .pvti, .nrrd, .zarr, .glb, .obj, .ply, .stl, .xyz, .png"),
               std::string::npos);
     EXPECT_NE(message("noextension").find("extension"), std::string::npos);
-    for (const char* name : {"a.vox", "a.schem", "a.binvox", "a.glb", "a.obj", "a.ply", "a.xyz", "a.png"})
+    for (const char* name : {"a.vox", "a.schem", "a.binvox", "a.glb", "a.obj", "a.ply", "a.stl", "a.xyz", "a.png"})
         EXPECT_NE(message(name).find("needs the occupancy"), std::string::npos) << name;
     EXPECT_EQ(message("a.NPY"), "no error"); // either case will do
     v.channels.clear();

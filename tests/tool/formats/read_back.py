@@ -591,6 +591,39 @@ def check_obj(case, files):
     check_sides(case, np.concatenate(triangles), np.concatenate(colors) if colors else None, 1e-9)
 
 
+def check_stl(case, files):
+    import numpy as np
+    import trimesh
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOGeometry import vtkSTLReader
+
+    triangles = []
+    for file in files:
+        data = file.read_bytes()
+        assert not data.startswith(b"solid"), "readers would take it for text"
+        if case["density"] == 0:
+            assert len(data) == 84 and data[80:] == bytes(4)
+            continue
+        mesh = trimesh.load(file, process=False)
+        triangles.append(np.asarray(mesh.triangles))
+        assert len(data) == 84 + 50 * len(mesh.faces)
+        a, b, c = triangles[-1].transpose(1, 0, 2)
+        normals = np.cross(b - a, c - a)
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        stored = np.frombuffer(data, np.dtype([("n", "<f4", 3), ("v", "<f4", 9), ("a", "<u2")]), offset=84)["n"]
+        assert np.abs(stored - normals).max() < 1e-5, "a normal that is not its triangle's"
+        reader = vtkSTLReader()
+        reader.SetFileName(str(file))
+        reader.MergingOff()
+        reader.Update()
+        assert reader.GetOutput().GetNumberOfCells() == len(mesh.faces)
+        assert np.array_equal(vtk_to_numpy(reader.GetOutput().GetPoints().GetData()).reshape(-1, 3, 3), triangles[-1])
+    assert case["name"] != "pieces" or len(files) > 3
+    if triangles:
+        # The format has no colours, so those of the volume neither are there nor keep faces apart.
+        check_sides(dict(case, channels=case["channels"][:1]), np.concatenate(triangles), None, 1e-4)
+
+
 def check_glb(case, files):
     import numpy as np
     import pygltflib

@@ -63,9 +63,9 @@ volume with_targets(std::array<std::int64_t, 3> extent, std::uint32_t density) {
 
 std::vector<sample_case> make_cases() {
     const std::vector<std::string> any{".npy", ".npz", ".vti", ".pvti", ".nrrd", ".zarr"};
-    const std::vector<std::string> solid{".npy",    ".npz", ".vti", ".nrrd", ".zarr", ".vox", ".schem",
-                                         ".binvox", ".glb", ".obj", ".ply",  ".xyz",  ".png", ".html"};
-    const std::vector<std::string> meshes{".glb", ".obj", ".ply"};
+    const std::vector<std::string> solid{".npy", ".npz", ".vti", ".nrrd", ".zarr", ".vox", ".schem", ".binvox",
+                                         ".glb", ".obj", ".ply", ".stl",  ".xyz",  ".png", ".html"};
+    const std::vector<std::string> meshes{".glb", ".obj", ".ply", ".stl"};
     std::vector<sample_case> cases;
     const auto add = [&](const char* name, std::array<std::int64_t, 3> extent, std::uint32_t density, bool color,
                          bool all_types, const std::vector<std::string>& extensions) -> sample_case& {
@@ -83,13 +83,13 @@ std::vector<sample_case> make_cases() {
     add("split", {260, 40, 513}, 997, true, false, {".vox", ".schem", ".binvox"}).options.up = up_axis::z;
     add("split_y", {270, 513, 33}, 997, true, false, {".vox"});
     add("empty", {9, 8, 7}, 0, false, false,
-        {".npy", ".npz", ".vti", ".nrrd", ".zarr", ".schem", ".binvox", ".glb", ".obj", ".ply", ".xyz", ".png",
+        {".npy", ".npz", ".vti", ".nrrd", ".zarr", ".schem", ".binvox", ".glb", ".obj", ".ply", ".stl", ".xyz", ".png",
          ".html"});
     add("merged", {40, 33, 21}, 2, false, false, meshes).options.merge_faces = true;
     add("merged_colors", {40, 33, 21}, 1, true, false, meshes).options.merge_faces = true;
     add("pieces", {37, 23, 11}, 5, true, false, meshes).options.faces_per_file = 1000;
     add("points", {37, 23, 11}, 5, true, false, {".ply"}).options.points = true;
-    add("boxes", {37, 23, 11}, 5, true, false, {".glb", ".obj", ".ply", ".xyz"}).v.voxel_size = {0.1, 0.25, 3};
+    add("boxes", {37, 23, 11}, 5, true, false, {".glb", ".obj", ".ply", ".stl", ".xyz"}).v.voxel_size = {0.1, 0.25, 3};
     sample_case& types = add("types", {13, 7, 5}, 2, false, true, any);
     types.v.voxel_size = {0.1, 0.25, 3};
     types.extensions.push_back(".html");

@@ -24,7 +24,7 @@ namespace voxelize::assimp {
     return path;
 }
 
-// ".obj" of "Chair.OBJ"; empty where there is none.
+// ".obj" of "Chair.OBJ"; empty for a name without an extension.
 [[nodiscard]] inline std::string lower_extension(const std::filesystem::path& file) {
     std::string extension = file.extension().string();
     std::transform(extension.begin(), extension.end(), extension.begin(),

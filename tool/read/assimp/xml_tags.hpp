@@ -22,7 +22,7 @@ public:
 
     // False behind the last, and where the document is cut short.
     [[nodiscard]] bool next();
-    // The value of the attribute of this name, whatever its prefix; empty where there is none.
+    // The value of the attribute of this name, whatever its prefix; empty for a tag without it.
     [[nodiscard]] std::string_view value(std::string_view of) const {
         for (const auto& [key, text] : attributes)
             if (local(key) == of) return text;

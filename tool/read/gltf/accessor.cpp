@@ -36,7 +36,7 @@ void with_component(int component_type, Visit&& visit) {
     }
 }
 
-// The same for the unsigned types, which indices have.
+// Reads a value of an unsigned type, which indices have.
 template <class Visit>
 void with_index_component(int component_type, Visit&& visit) {
     if (component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE) return visit(std::uint8_t{});

@@ -33,7 +33,7 @@ public:
         used_ += bytes;
     }
 
-    // The same for what outlives every scope.
+    // Counts memory that outlives every scope.
     void charge_to_the_end(std::uint64_t count, std::uint64_t bytes_each, const std::string& what) {
         charge(count, bytes_each, what);
         lasting_ += saturating_product(count, bytes_each);

@@ -15,7 +15,7 @@ namespace voxelize::gltf {
 // Views into the bytes given to split_container.
 struct container {
     std::string_view json;
-    std::span<const std::byte> binary; // of the BIN chunk; empty where there is none
+    std::span<const std::byte> binary; // of the BIN chunk; empty for a file without one
     bool has_binary = false;
 };
 

@@ -12,7 +12,7 @@
 
 namespace voxelize {
 
-// The triangles of a polygon of n >= 3 corners, as numbers of its corners: always n - 2, none where n < 3, each wound
+// The triangles of a polygon of n >= 3 corners, as numbers of its corners: always n - 2, or 0 where n < 3, each wound
 // as the polygon is. Concave polygons are cut by their ears in the plane of their area; where none is found (crossing
 // edges, corners at one place, positions that are not finite), the rest is a fan. The result is valid until the next
 // call.

@@ -120,7 +120,7 @@ private:
         return value;
     }
 
-    // Of the object (Magics), and whether facets have their own.
+    // The colour of the object (Magics), and whether facets have their own.
     void read_colors(const std::string& header) {
         constexpr std::string_view key = "COLOR=";
         const std::size_t at = header.find(key);

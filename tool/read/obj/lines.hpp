@@ -34,7 +34,7 @@ private:
 
     std::ifstream file_;
     std::vector<char> buffer_;
-    std::size_t at_ = 0, end_ = 0; // of what is no line yet, in the buffer
+    std::size_t at_ = 0, end_ = 0; // the unfinished line in the buffer
     std::uint64_t lines_ = 0;      // that the file has up to here
     std::uint64_t number_ = 0;
     bool has_started_ = false, ended_with_cr_ = false;
@@ -46,7 +46,7 @@ private:
 // TEXT without blanks around it.
 [[nodiscard]] std::string_view trimmed(std::string_view text);
 
-// Cuts the first word off REST and returns it; empty where there is none.
+// Cuts the first word off REST and returns it; empty for a REST of blanks.
 [[nodiscard]] std::string_view next_word(std::string_view& rest);
 
 // A name of one or more words as a line has it: without blanks around it, and without a pair of quotes.

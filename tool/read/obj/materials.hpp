@@ -26,7 +26,7 @@ namespace voxelize::obj {
 
 // Returns the path of a file that an OBJ in FOLDER or one of its libraries names, relative to FOLDER: where the name
 // says, else beside the file that names it (IN, relative to FOLDER), else beside the model. Empty where no such file
-// exists, or the name leads out of FOLDER and there is none beside the model.
+// exists, or the name leads out of FOLDER and no such file is beside the model.
 [[nodiscard]] std::filesystem::path find_file(const std::filesystem::path& folder, const std::string& name,
                                               const std::filesystem::path& in = {});
 

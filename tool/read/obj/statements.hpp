@@ -29,7 +29,8 @@ enum class statement : std::uint8_t {
 // The statement of a line, whose key is cut off it.
 [[nodiscard]] statement statement_of(std::string_view& line);
 
-// Number `index` of a file, from 1 or backwards from -1, of COUNT things so far -> from 0. Nothing where it is none.
+// Number `index` of a file, from 1 or backwards from -1, of COUNT things so far -> from 0. Nothing for an index of no
+// such thing.
 [[nodiscard]] std::optional<std::uint64_t> resolve(std::int64_t index, std::uint64_t count);
 
 // The indices of a corner, as in "7", "7/1", "7/1/3" and "7//3"; 0 where one is left out. Nothing where WORD is none.

@@ -366,7 +366,7 @@ void describe_output(CLI::App& app, command_line& options) {
         ->option_text("AXIS")
         ->group("Files");
     app.add_flag("--merge", options.write.merge_faces,
-                 "Join the faces of .glb, .obj and .ply: coplanar ones of equal colour become one rectangle")
+                 "Join the faces of .glb, .obj, .ply and .stl: coplanar ones of equal colour become one rectangle")
         ->group("Files");
     app.add_flag("--points", options.write.points, "Write the centres of the voxels into .ply, not their outer sides")
         ->group("Files");

@@ -29,10 +29,10 @@ struct write_options {
     std::uint64_t leaves_per_grid = 0xffff'ffff; // .nvdb: most bricks in a grid; the format has no more
     up_axis up = up_axis::y;                     // which world axis stands upright in .vox and .schem; glTF's is y
     int threads = 0;                             // 0 takes all cores. No output depends on it
-    bool merge_faces = false;             // .ply, .obj, .glb: coplanar faces of equal colour become one rectangle
+    bool merge_faces = false;             // .ply, .obj, .glb, .stl: coplanar faces of equal colour become one rectangle
     bool points = false;                  // .ply holds the voxels' centres, not their outer sides
     bool lists = true;                    // .npy, .npz of a sparse volume list its voxels; false: they hold the grid
-    std::uint64_t faces_per_file = 0;     // .ply, .obj, .glb: most faces in a file; 0: what the format can number
+    std::uint64_t faces_per_file = 0;     // .ply, .obj, .glb, .stl: most faces in a file; 0: what the format can number
     preview_options preview;              // camera and light of .png
     std::function<void(double)> progress; // called with 0..1 now and then, from the calling thread; may be empty
     // Called with a line that names the file, where it is written but readers of its format do not show all of it; from

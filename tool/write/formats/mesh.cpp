@@ -5,12 +5,13 @@
 
 #include "model/parallel.hpp"
 #include "progress.hpp"
+#include "stl.hpp"
 #include "text.hpp"
 #include "voxel_mesh.hpp"
+#include "write_items.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <memory>
 
 namespace voxelize {
@@ -18,7 +19,6 @@ namespace {
 
 constexpr std::uint64_t max_faces = std::uint64_t{1} << 30; // four corners each, numbered with 32 bits
 constexpr std::uint64_t max_glb_faces = 40'000'000;         // of at most 104 bytes each in a file of 4 GiB
-constexpr std::size_t block_items = std::size_t{1} << 15;   // formatted at once by one thread
 
 std::uint8_t red(std::uint32_t rgb) { return static_cast<std::uint8_t>(rgb); }
 std::uint8_t green(std::uint32_t rgb) { return static_cast<std::uint8_t>(rgb >> 8); }
@@ -27,30 +27,6 @@ std::uint8_t blue(std::uint32_t rgb) { return static_cast<std::uint8_t>(rgb >> 1
 // World coordinate of lattice plane `n` + `part` along an axis.
 double world(const voxel_shape& v, std::size_t axis, double n) {
     return std::fma(n, v.voxel_size[axis], v.origin[axis]);
-}
-
-template <class T>
-void put(std::string& out, T value) {
-    const std::size_t at = out.size();
-    out.resize(at + sizeof(T));
-    std::memcpy(out.data() + at, &value, sizeof(T));
-}
-
-// Formats COUNT items in blocks on all threads and writes the blocks in order, a few at a time.
-template <class Format> // void(std::string& out, std::size_t item)
-void write_items(output_file& out, std::size_t count, int threads, progress_meter& meter, const Format& format) {
-    const int workers = thread_count(threads);
-    const std::size_t at_once = block_items * static_cast<std::size_t>(4 * workers);
-    for (std::size_t begin = 0; begin < count; begin += at_once) {
-        const std::size_t end = std::min(count, begin + at_once);
-        std::vector<std::string> blocks((end - begin + block_items - 1) / block_items);
-        parallel_for(blocks.size(), workers, [&](std::size_t b) {
-            const std::size_t first = begin + b * block_items;
-            for (std::size_t n = first; n < std::min(end, first + block_items); ++n) format(blocks[b], n);
-        });
-        for (const std::string& block : blocks) out.write(block);
-        meter.advance(end - begin);
-    }
 }
 
 // A file of a mesh, and the faces that it holds.
@@ -80,7 +56,8 @@ std::uint64_t most_faces(std::uint64_t of_format, const write_options& options) 
 // end.
 template <class Write>
 std::vector<std::filesystem::path> write_parts(const voxel_shape& v, const std::filesystem::path& path,
-                                               const write_options& options, std::uint64_t most, const Write& write) {
+                                               const write_options& options, std::uint64_t most, const Write& write,
+                                               bool has_colors = true) {
     most = most_faces(most, options);
     auto probe = std::make_unique<output_file>(path); // a path that cannot be written costs no work
     std::function<void(double)> first_half, second_half;
@@ -88,7 +65,7 @@ std::vector<std::filesystem::path> write_parts(const voxel_shape& v, const std::
         first_half = [&](double done) { options.progress(0.5 * done); };
         second_half = [&](double done) { options.progress(0.5 + 0.5 * done); };
     }
-    const std::vector<voxel_face> faces = voxel_faces(v, options.merge_faces, options.threads, first_half);
+    const std::vector<voxel_face> faces = voxel_faces(v, options.merge_faces, options.threads, first_half, has_colors);
     const std::vector<mesh_part> parts = split(faces, path, most);
     progress_meter meter(second_half, 2 * static_cast<std::uint64_t>(faces.size())); // about one vertex a face
     std::vector<std::unique_ptr<output_file>> files;
@@ -270,6 +247,16 @@ void write_glb_part(output_file& out, const voxel_shape& v, const welded_mesh& m
     });
 }
 
+// True if two neighbouring planes of the lattice become one as floats.
+bool floats_merge_planes(const voxel_shape& v) {
+    for (std::size_t a = 0; a < 3; ++a)
+        for (std::int64_t n = 0; n < v.extent[a]; ++n) {
+            const auto here = static_cast<float>(world(v, a, static_cast<double>(n)));
+            if (here == static_cast<float>(world(v, a, static_cast<double>(n + 1)))) return true;
+        }
+    return false;
+}
+
 } // namespace
 
 written_names mesh_names(const volume& shape, const std::filesystem::path& path, const write_options& options,
@@ -342,6 +329,27 @@ std::vector<std::filesystem::path> write_glb(const voxel_shape& v, const std::fi
                        [&](output_file& out, const welded_mesh& mesh, progress_meter& meter) {
                            write_glb_part(out, v, mesh, options, meter);
                        });
+}
+
+std::vector<std::filesystem::path> write_stl(const voxel_shape& v, const std::filesystem::path& path,
+                                             const write_options& options) {
+    if (options.warn && floats_merge_planes(v))
+        options.warn(path.string() + ": the floats of .stl cannot tell neighbouring corners of this grid apart, which "
+                                     "is far from 0 for its voxel size; .ply and .obj can");
+    return write_parts(
+        v, path, options, max_faces,
+        [&](output_file& out, const welded_mesh& mesh, progress_meter& meter) {
+            write_stl_triangles(out, 2 * std::uint64_t{mesh.quads.size()}, options.threads, meter, [&](std::size_t n) {
+                const std::array<std::uint32_t, 4>& quad = mesh.quads[n / 2];
+                stl_triangle triangle{};
+                for (std::size_t c = 0; c < 3; ++c) {
+                    const auto& corner = mesh.vertices[quad[c == 0 ? 0 : c + n % 2]].corner;
+                    for (std::size_t a = 0; a < 3; ++a) triangle[c][a] = world(v, a, corner[a]);
+                }
+                return triangle;
+            });
+        },
+        false);
 }
 
 std::vector<std::filesystem::path> write_xyz(const voxel_shape& v, const std::filesystem::path& path,

@@ -79,9 +79,9 @@ brick_planes planes_of(const voxelpipe::brick_mask& mask, int axis) {
 class layer_sides {
 public:
     layer_sides(const voxel_shape& shape, const brick_order& order, int axis,
-                std::span<const brick_order::placed> layer)
-        : shape_(shape), order_(order), axis_(axis), layer_(layer), below_(order.layer_at(layer.front().at() - 1)),
-          above_(order.layer_at(layer.front().at() + 1)) {}
+                std::span<const brick_order::placed> layer, bool colors)
+        : shape_(shape), order_(order), axis_(axis), colors_(colors), layer_(layer),
+          below_(order.layer_at(layer.front().at() - 1)), above_(order.layer_at(layer.front().at() + 1)) {}
 
     void append(std::vector<voxel_face>& out, bool merge) {
         brick_order::for_each_row(layer_, [&](std::span<const brick_order::placed> row) { add_row(row); });
@@ -127,7 +127,7 @@ private:
         voxel_face face;
         for (int i = 0; i < 3; ++i) face.low[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(voxel[i]);
         face.low[static_cast<std::size_t>(axis_)] += n % 2; // the plane beyond the voxel
-        face.rgb = shape_.rgb(p.brick, voxel);
+        if (colors_) face.rgb = shape_.rgb(p.brick, voxel);
         face.direction = static_cast<std::uint8_t>(2 * static_cast<unsigned>(axis_) + n % 2);
         planes_[n].push_back(face);
     }
@@ -135,6 +135,7 @@ private:
     const voxel_shape& shape_;
     const brick_order& order_;
     int axis_;
+    bool colors_;
     std::span<const brick_order::placed> layer_, below_, above_;
     std::vector<exposed_planes> exposed_;            // of the bricks of a row
     std::array<std::vector<voxel_face>, 16> planes_; // two directions each
@@ -189,7 +190,7 @@ private:
 } // namespace
 
 std::vector<voxel_face> voxel_faces(const voxel_shape& shape, bool merge, int threads,
-                                    const std::function<void(double)>& progress) {
+                                    const std::function<void(double)>& progress, bool colors) {
     struct layer_of_axis {
         int axis;
         std::size_t layer;
@@ -206,7 +207,7 @@ std::vector<voxel_face> voxel_faces(const voxel_shape& shape, bool merge, int th
         [&](std::size_t n) {
             const auto [axis, layer] = work[n];
             const brick_order& order = orders[static_cast<std::size_t>(axis)];
-            layer_sides(shape, order, axis, order.layer(layer)).append(parts[n], merge);
+            layer_sides(shape, order, axis, order.layer(layer), colors).append(parts[n], merge);
         },
         [&](std::size_t finished) {
             if (progress) progress(static_cast<double>(finished) / static_cast<double>(work.size()));

@@ -3,7 +3,7 @@
 #pragma once
 
 // The surface of the occupied voxels as rectangles: one for each side of a voxel that has no occupied neighbour there
-// (voxels at the grid's border have none outside). Shared by the writers of .ply, .obj and .glb.
+// (voxels at the grid's border have none outside). Shared by the writers of .ply, .obj, .glb and .stl.
 
 #include "voxel_shape.hpp"
 
@@ -29,9 +29,10 @@ struct voxel_face {
 
 // All faces, by axis, then layer along it, then direction, then position; the same list for any number of threads. With
 // `merge`, sides of equal colour in one plane are joined greedily: each rectangle first grows along its first axis,
-// then along its second. `progress` gets 0..1 from the calling thread; it may be empty.
+// then along its second. `progress` gets 0..1 from the calling thread; it may be empty. Without
+// `colors` all faces are of colour 0.
 [[nodiscard]] std::vector<voxel_face> voxel_faces(const voxel_shape& shape, bool merge, int threads,
-                                                  const std::function<void(double)>& progress);
+                                                  const std::function<void(double)>& progress, bool colors = true);
 
 // Faces as an indexed mesh in which equal corners of equal colour are one vertex.
 struct welded_mesh {
