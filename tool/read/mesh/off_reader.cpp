@@ -32,7 +32,7 @@ struct off_header {
     bool has_texcoords = false, has_colors = false, has_normals = false, is_homogeneous = false, is_n = false;
     bool is_binary = false;
 
-    // Returns false where WORD is no number.
+    // Returns false where WORD is no header of an OFF file.
     [[nodiscard]] bool take(std::string_view word) {
         std::string text(word);
         std::transform(text.begin(), text.end(), text.begin(),
