@@ -35,13 +35,17 @@ void write_stl_triangles(output_file& out, std::uint64_t count, int threads, pro
     header.resize(header_bytes);
     out.write(header);
     out.write_value(static_cast<std::uint32_t>(count));
-    write_items(out, count, threads, meter, [&](std::string& text, std::size_t n) {
-        const stl_triangle corners = triangle(n);
-        for (const double each : normal_of(corners)) put(text, static_cast<float>(each));
-        for (const std::array<double, 3>& corner : corners)
-            for (const double each : corner) put(text, static_cast<float>(each));
-        put(text, std::uint16_t{0});
-    });
+    constexpr std::size_t triangle_bytes = 50;
+    write_items(
+        out, count, threads, meter,
+        [&](std::string& text, std::size_t n) {
+            const stl_triangle corners = triangle(n);
+            for (const double each : normal_of(corners)) put(text, static_cast<float>(each));
+            for (const std::array<double, 3>& corner : corners)
+                for (const double each : corner) put(text, static_cast<float>(each));
+            put(text, std::uint16_t{0});
+        },
+        triangle_bytes);
 }
 
 } // namespace voxelize

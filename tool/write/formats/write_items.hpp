@@ -24,9 +24,11 @@ void put(std::string& out, T value) {
     std::memcpy(out.data() + at, &value, sizeof(T));
 }
 
-// Formats COUNT items in blocks on all threads and writes the blocks in order, a few at a time.
+// Formats COUNT items in blocks on all threads and writes the blocks in order, a few at a time. Items of equal
+// size say their bytes, so that blocks need not grow.
 template <class Format> // void(std::string& out, std::size_t item)
-void write_items(output_file& out, std::size_t count, int threads, progress_meter& meter, const Format& format) {
+void write_items(output_file& out, std::size_t count, int threads, progress_meter& meter, const Format& format,
+                 std::size_t item_bytes = 0) {
     constexpr std::size_t block_items = std::size_t{1} << 15; // formatted at once by one thread
     const int workers = thread_count(threads);
     const std::size_t at_once = block_items * static_cast<std::size_t>(4 * workers);
@@ -35,7 +37,9 @@ void write_items(output_file& out, std::size_t count, int threads, progress_mete
         std::vector<std::string> blocks((end - begin + block_items - 1) / block_items);
         parallel_for(blocks.size(), workers, [&](std::size_t b) {
             const std::size_t first = begin + b * block_items;
-            for (std::size_t n = first; n < std::min(end, first + block_items); ++n) format(blocks[b], n);
+            const std::size_t last = std::min(end, first + block_items);
+            blocks[b].reserve(item_bytes * (last - first));
+            for (std::size_t n = first; n < last; ++n) format(blocks[b], n);
         });
         for (const std::string& block : blocks) out.write(block);
         meter.advance(end - begin);
