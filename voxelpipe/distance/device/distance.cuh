@@ -40,7 +40,7 @@ public:
                           core::sign_options(options), triangles_in);
     }
     [[nodiscard]] inside_rows rows() const {
-        if (!bits_) return {nullptr, {}};
+        if (!bits_) return {nullptr, glm::ivec3(0)};
         const auto& t = get<0>(bits_->view().targets);
         return {t.elements, t.extent};
     }
