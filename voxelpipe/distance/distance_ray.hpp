@@ -28,6 +28,7 @@ struct distance_samples {
         float v[8];    // x changes fastest
         float part[3]; // 0 to 1
     };
+    // The cell of samples that holds a world position; positions outside the field are moved to its border.
     [[nodiscard]] VOXELPIPE_HD cell cell_at(const glm::dvec3& world) const {
         cell c{};
         int low[3], high[3];

@@ -68,7 +68,7 @@ struct source {
     grid where;                                               // the map from indices to the world
     stored_value<T> background{};                             // what absent voxels read as
     std::function<stored_value<T>(std::uint64_t rank)> value; // of a voxel that exists
-    grid_class meaning = value_type<T>::meaning;
+    grid_class meaning = value_type<T>::meaning;              // the class that the file states
     // A level set: `meaning` says so, and `inside` has a mask for each brick, of voxels that read as -background unless
     // they exist; a brick of the table may be empty then. The table's tiles are cubes of such voxels, which are not
     // active: `value` is not asked for them. Numbers alone; not owned, has to stay until write().
