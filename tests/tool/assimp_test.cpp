@@ -32,10 +32,6 @@ scene load(const std::string& name, const std::vector<std::byte>& bytes, const f
     return voxelize::load_by_assimp(bytes, name, reader, limits);
 }
 
-scene load(const std::string& name, std::string_view text, const files& others = {}) {
-    return load(name, bytes_of(text), others);
-}
-
 std::string error_of(const std::string& name, const std::vector<std::byte>& bytes,
                      const voxelize::gltf_limits& limits = {}) {
     try {
@@ -51,8 +47,7 @@ std::string error_of(const std::string& name, const std::vector<std::byte>& byte
 
 constexpr const char* square_obj = "v 0 0 5\nv 2 0 5\nv 2 2 5\nv 0 2 5\nf 1 2 3 4\n";
 
-// ---- Files that are wrong
-// --------------------------------------------------------------------------------------------
+// ---- Files that are wrong ------------------------------------------------------------------------------------------
 
 struct sample {
     const char* name;
