@@ -175,7 +175,8 @@ void text_reader::warn_of_statements(const std::map<statement, std::pair<std::ui
         if (kind == statement::surface) what = "is a free-form surface, which is not drawn: export it as polygons";
         if (kind == statement::curve) what = "is a free-form curve, which is not drawn: export it as a line";
         if (kind == statement::call) what = "names another file, which is not read";
-        description_.warnings.push_back(first + ' ' + what + several);
+        std::string& warning = description_.warnings.emplace_back(first);
+        warning.append(1, ' ').append(what).append(several);
     }
 }
 
