@@ -38,7 +38,8 @@ found_brick look_at(const volume& v, const channel& c, float band, const glm::iv
     found_brick found;
     found.key = voxelpipe::core::morton_key(brick.x, brick.y, brick.z);
     const auto end = [&](int axis) {
-        return static_cast<int>(std::min<std::int64_t>(8, v.extent[static_cast<std::size_t>(axis)] - 8 * brick[axis]));
+        const std::int64_t left = v.extent[static_cast<std::size_t>(axis)] - std::int64_t{8} * brick[axis];
+        return static_cast<int>(std::min<std::int64_t>(8, left));
     };
     for (int z = 0; z < end(2); ++z)
         for (int y = 0; y < end(1); ++y)

@@ -145,8 +145,7 @@ void add_count(openvdb::GridPtrVec& grids, const sparse_volume& v, const channel
 
 // The distances of a field: beyond its band plus or minus the background, not active.
 openvdb::GridBase::Ptr distance_grid(const band_bricks& b, const channel& c) {
-    const openvdb::GridBase::Ptr made =
-        make_grid<openvdb::FloatGrid>(b.band, c.name, b.background, values_of<float>(c));
+    openvdb::GridBase::Ptr made = make_grid<openvdb::FloatGrid>(b.band, c.name, b.background, values_of<float>(c));
     if (!b.is_level_set) return made;
     const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(made);
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
