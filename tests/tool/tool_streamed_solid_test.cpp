@@ -119,15 +119,13 @@ TEST(StreamedSolids, VotesOfClosedAndOpenModels) {
     two_ways{folder, folder / "m.ply", {"-r", "60", "--padding", "4", "--solid", "nonzero", "--vote"}}.expect_equal(60);
 }
 
-TEST(StreamedSolids, StlAndObj) {
+// OBJ: StreamedObj in tool_streamed_obj_test.cpp; a ball of this size fits, read by the OBJ reader.
+TEST(StreamedSolids, Stl) {
     if (sanitized) return;
     const scratch_folder folder;
     write_ball(folder / "m.stl", 16);
     two_ways{folder, folder / "m.stl", {"-r", "60", "--solid", "exterior", "--closing", "2", "-t", "count,triangle"}}
         .expect_equal(60);
-    write_ball(folder / "m.obj", 60);
-    two_ways{folder, folder / "m.obj", {"-r", "60", "--solid", "nonzero", "--vote", "-t", "occupancy,depth"}}
-        .expect_equal(72);
 }
 
 // Several parts, of which one mirrors, and colours.
