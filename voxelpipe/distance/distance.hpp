@@ -35,7 +35,9 @@ struct band {
 private:
     constexpr band(double number_of_voxels, bool all) : voxels(number_of_voxels), is_whole(all) {}
 };
+#if !defined(DOXYGEN) // which takes it for a second member
 inline constexpr band band::whole{0.0, true};
+#endif
 
 // Where samples lie.
 enum class sample : std::uint8_t {
