@@ -6,6 +6,7 @@
 // size. The tree only rejects: its boxes are rounded outwards, and what it keeps is decided by exact numbers.
 
 #include <cpu_ref/pipeline.hpp>
+#include <voxelpipe/core/morton.hpp>
 #include <voxelpipe/distance/core/point_triangle.hpp>
 #include <voxelpipe/distance/distance.hpp>
 #include <voxelpipe/triangle_counts.hpp>
@@ -163,17 +164,10 @@ private:
             std::uint32_t at;
         };
         raw_array<item> order(triangles_.size());
-        const auto spread = [](double a) {
-            auto v = static_cast<std::uint64_t>(a);
-            v = (v | v << 16) & 0x030000ff0000ffu;
-            v = (v | v << 8) & 0x0300f00f00f00fu;
-            v = (v | v << 4) & 0x030c30c30c30c3u;
-            return (v | v << 2) & 0x9249249249249u;
-        };
+        const auto cell = [&](double at, double from) { return static_cast<int>((at - from) * cells); };
         for (std::size_t i = 0; i < triangles_.size(); ++i) {
             const vector3 c = centre(triangles_[i]);
-            order[i] = {spread((c.x - low.x) * cells) | spread((c.y - low.y) * cells) << 1 |
-                            spread((c.z - low.z) * cells) << 2,
+            order[i] = {core::morton_key(cell(c.x, low.x), cell(c.y, low.y), cell(c.z, low.z)),
                         static_cast<std::uint32_t>(i)};
         }
         radix_sort(how.threads, order, 33);

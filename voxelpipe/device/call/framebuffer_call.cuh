@@ -75,7 +75,10 @@ struct framebuffer_call<draw<Mesh, VertexShader, FragmentShader>, Framebuffer, P
     using scene_buffers = scene_memory<Mesh, VertexShader, FragmentShader>;
     using scene_type = typename scene_buffers::scene_type;
     using groups = target_groups<Framebuffer>;
-    using values = decltype(std::declval<typename scene_type::fragment_output>().values);
+    using fragment_type = fragment<typename scene_type::varyings>;
+    using output_type =
+        core::output_or_none<std::remove_cvref_t<std::invoke_result_t<const FragmentShader&, const fragment_type&>>>;
+    using values = decltype(std::declval<output_type>().values);
     using tracking_type = change_tracking<Framebuffer>;
     static constexpr tuning::fine_raster_policy policy = Policy;
     static constexpr possible_strategies possible = strategies_of<FragmentShader, Framebuffer>;

@@ -118,8 +118,6 @@ struct draw_shading {
 template <class FragmentShader, class Varyings>
 struct scene {
     using varyings = Varyings;
-    using fragment_output = core::output_or_none<
-        std::remove_cvref_t<std::invoke_result_t<const FragmentShader&, const fragment<Varyings>&>>>;
     using shading = draw_shading<FragmentShader, Varyings>;
 
     geometry geo;

@@ -15,7 +15,6 @@
 #include <cstdint>
 #include <span>
 #include <type_traits>
-#include <vector>
 
 namespace voxelpipe::device {
 
@@ -34,70 +33,46 @@ struct distance_shading {
     }
 };
 
-// Device memory for the draws of a call.
+// Device memory for the draws of a call, and for further parts of its geometry.
 template <class Mesh, class VertexShader, class Shader>
 struct distance_draws {
-    using varyings = typename core::shaded<Mesh, VertexShader>::varyings;
+    using memory_type = scene_memory<Mesh, VertexShader, Shader>;
+    using varyings = typename memory_type::varyings;
     using shading_type = distance_shading<Shader, varyings>;
     using draw_type = draw<Mesh, VertexShader, Shader>;
 
-    vertex_positions positions;
-    varyings* vertex_varyings;
-    draw_geometry* geometries; // null if there is one draw
-    draw_shading<Shader, varyings>* shadings;
+    memory_type memory;
+    draw_geometry* geometries; // of the draws and the further parts; null if there are no such parts
 
-    // num_more: further parts of the geometry.
-    distance_draws(arena& memory, std::span<const draw_type> draws, std::size_t num_more = 0) {
-        std::size_t vertices = 0;
-        for (const auto& d : draws) vertices += d.mesh.num_vertices();
-        positions = vertex_positions::take(memory, vertices);
-        vertex_varyings = memory.take<varyings>(std::is_empty_v<varyings> ? 0 : vertices);
-        geometries = memory.take<draw_geometry>(draws.size() + num_more > 1 ? draws.size() + num_more : 0);
-        shadings = memory.take<draw_shading<Shader, varyings>>(draws.size() > 1 ? draws.size() : 0);
-    }
+    // num_more: number of further parts.
+    distance_draws(arena& arena_of_call, std::span<const draw_type> draws, std::size_t num_more = 0)
+        : memory(arena_of_call, draws),
+          geometries(arena_of_call.take<draw_geometry>(num_more != 0 ? draws.size() + num_more : 0)) {}
 
     // Runs the vertex shaders. `more`: parts of the geometry behind the draws, without shaders.
     void shade(std::span<const draw_type> draws, const grid& g, geometry& geo, shading_type& s, cudaStream_t stream,
                std::span<const cone_part> more = {}) const {
-        geo = geometry{};
-        geo.num_draws = static_cast<std::uint32_t>(draws.size() + more.size());
-        geo.snap = core::make_snap_transform(g);
-        geo.extent = g.extent;
-        std::vector<draw_geometry> geometry_of(draws.size());
-        std::vector<core::numbering> numbers = core::make_numberings(draws);
-        numbers.resize(draws.size());
-        std::vector<draw_shading<Shader, varyings>> shading_of;
-        std::size_t vertex = 0;
-        std::uint32_t primitive = 0;
-        for (std::size_t d = 0; d < draws.size(); ++d) {
-            const Mesh& m = draws[d].mesh;
-            const vertex_positions of_draw = positions.from(vertex);
-            varyings* const own =
-                std::is_empty_v<varyings> || vertex_varyings == nullptr ? nullptr : vertex_varyings + vertex;
-            geometry_of[d] = geometry_from(m, of_draw, primitive);
-            shading_of.push_back({draws[d].fragment_shader, own, numbers[d]});
-            vertex_shade(m, draws[d].vertex_shader, geo.snap, static_cast<std::uint32_t>(d), of_draw, own, stream);
-            vertex += m.num_vertices();
-            primitive += static_cast<std::uint32_t>(m.num_triangles());
-        }
-        for (const cone_part& part : more) {
-            geometry_of.push_back(part.geometry);
-            geometry_of.back().first_primitive = primitive;
-            primitive += part.num_triangles;
-        }
-        geo.num_primitives = primitive;
-        geo.one = geometry_of[0];
-        s = {shading_of[0], nullptr, core::normal_factors(g), g.offset};
-        if (geometry_of.size() > 1) {
+        const auto shaded = memory.shade(draws, g, stream);
+        geo = shaded.geo;
+        s = {shaded.one, shaded.many, shaded.normal_factors, shaded.offset};
+        if (more.empty()) return;
+        if (geo.many != nullptr)
+            check(cudaMemcpyAsync(geometries, geo.many, draws.size() * sizeof(draw_geometry), cudaMemcpyDeviceToDevice,
+                                  stream));
+        else
             upload(
-                geometries, geometry_of.size(), [&](std::size_t d) { return geometry_of[d]; }, stream);
-            geo.many = geometries;
-        }
-        if (draws.size() > 1) {
-            upload(
-                shadings, draws.size(), [&](std::size_t d) { return shading_of[d]; }, stream);
-            s.many = shadings;
-        }
+                geometries, 1, [&](std::size_t) { return geo.one; }, stream);
+        upload(
+            geometries + draws.size(), more.size(),
+            [&](std::size_t i) {
+                draw_geometry part = more[i].geometry;
+                part.first_primitive = geo.num_primitives;
+                geo.num_primitives += more[i].num_triangles;
+                return part;
+            },
+            stream);
+        geo.many = geometries;
+        geo.num_draws += static_cast<std::uint32_t>(more.size());
     }
 };
 
