@@ -164,9 +164,6 @@ TEST(DistancePipeline, BadInputIsCountedOrRefused) {
     EXPECT_EQ(code({.sign = none, .repair = vp::repair::vote}), vp::status_code::bad_distance_options);
     EXPECT_EQ(code({.rule = vp::fill_rule::even_odd, .repair = vp::repair::vote}), vp::status_code::bad_solid_options);
     EXPECT_EQ(code({.repair = vp::repair::exterior, .closing = -1}), vp::status_code::bad_solid_options);
-    EXPECT_EQ(code({.rule = vp::fill_rule::even_odd, .repair = vp::repair::winding}),
-              vp::status_code::bad_solid_options);
-    EXPECT_EQ(code({.repair = vp::repair::winding}), vp::status_code::strategy_unavailable);
     m.triangles.push_back({0, 1, 1000});
     const field bad = library_field(m, g);
     EXPECT_EQ(bad.status.code, vp::status_code::index_out_of_range);

@@ -275,8 +275,6 @@ TEST(Distance, WhatDoesNotGoTogetherIsRefused) {
     refused({"--distance", "--unsigned", "--solid", "nonzero"}, "--unsigned has no sign");
     refused({"--distance", "--unsigned", "--vote"}, "--unsigned has no sign");
     refused({"--distance", "--unsigned", "--close-holes"}, "--unsigned has no sign");
-    refused({"--distance", "--winding", "--solid", "even_odd"}, "--winding does not go with --solid even_odd");
-    refused({"--distance", "--winding"}, "--winding");
     refused({"--distance", "-t", "count"}, "count does not go with --distance");
     refused({"--distance", "--coverage", "thin"}, "--coverage");
     refused({"--distance", "--levels"}, "--levels does not go with --distance");

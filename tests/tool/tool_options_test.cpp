@@ -39,7 +39,6 @@ std::set<std::string> all_options() {
             "--close-holes [=EDGES]",
             "--vote",
             "--closing R",
-            "--winding",
             "--distance",
             "--band N|whole",
             "--unsigned",

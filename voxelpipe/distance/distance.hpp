@@ -60,7 +60,7 @@ struct distance_options {
     voxelpipe::bodies bodies = voxelpipe::bodies::call;   // draw: inside of any draw
     voxelpipe::repair repair = voxelpipe::repair::none;   // of meshes that are not closed
     int closing = 0;                                      // exterior: gaps that are closed, 0 to max_closing
-    std::uint64_t max_hole_edges = std::numeric_limits<std::uint64_t>::max(); // close_holes and winding
+    std::uint64_t max_hole_edges = std::numeric_limits<std::uint64_t>::max(); // close_holes
     bool count_voxels = true;                                                 // fill counters::voxels
 };
 

@@ -43,9 +43,6 @@ enum class repair : std::uint8_t {
     // diagnose_repair (diagnose_repair.hpp) tells whether a flood took part of the inside.
     exterior, // what a flood from outside the grid does not reach through untouched voxels: fills cavities; no crops
     vote,     // what most of the closed rows along x, y and z call inside by even_odd; a tie is outside
-    // Where the generalized winding number, solid angles over 4 pi, is at least 1/2 (nonzero: its magnitude; even_odd
-    // is refused as bad_solid_options). Reserved: no backend draws it yet, and calls return strategy_unavailable.
-    winding,
 };
 
 // What repair::exterior and repair::vote take from the rest of the grid where a call draws a slab of it along z. Bits
@@ -146,12 +143,10 @@ inline constexpr bool takes_solid_slabs = requires {
 
 [[nodiscard]] inline status validate(const solid_options& o, const grid& g, bool takes_slabs = false) {
     const bool known = o.rule <= fill_rule::positive && o.bodies <= bodies::draw && o.extent <= solid_extent::inner &&
-                       o.repair <= repair::winding;
+                       o.repair <= repair::vote;
     if (!known || o.closing < 0 || o.closing > solid_options::max_closing)
         return failure(status_code::bad_solid_options);
     constexpr solid_options plain;
-    if (o.repair == repair::winding && o.rule == fill_rule::even_odd) return failure(status_code::bad_solid_options);
-    if (o.repair == repair::winding) return failure(status_code::strategy_unavailable);
     if (o.repair != repair::none && o.repair != repair::close_holes &&
         (o.rule != plain.rule || o.extent != plain.extent))
         return failure(status_code::bad_solid_options);

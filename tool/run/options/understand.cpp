@@ -75,11 +75,6 @@ void understand_batch(command_line& options, bool has_world, bool has_rank) {
 
 void understand_solid(command_line& options, const raw_options& raw) {
     if (raw.coverage) options.voxelize.coverage = *raw.coverage;
-    if (raw.winding)
-        throw usage_error(raw.solid == solid_rule::even_odd
-                              ? "--winding does not go with --solid even_odd"
-                              : "--winding: this version has no repair by winding numbers; --close-holes, --vote and "
-                                "--solid exterior are there");
     if (!raw.solid && !raw.distance) {
         const std::pair<const char*, bool> given[]{{"--solid-extent", raw.extent_of_solid.has_value()},
                                                    {"--close-holes", !raw.close_holes.empty()},
