@@ -1,0 +1,57 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+"""cuda_ptx.py BUILD JOBS REGEX...: compiles the .cu of BUILD/compile_commands.json that a REGEX matches to PTX, each once.
+
+nvcc reads all of a file, templates of the host's among them, and generates the kernels' code. What is left out is the
+host's object, ptxas and the link, which take three quarters of the time: a program that nobody can run without a GPU
+needs none of them. The files that each was made of are listed in BUILD/ptx/*.d, in make's form.
+"""
+
+import concurrent.futures
+import json
+import pathlib
+import re
+import shlex
+import subprocess
+import sys
+
+
+def ptx_command(entry, name):
+    """The entry's nvcc and its options, without a launcher; PTX of one architecture in place of an object."""
+    given = iter(shlex.split(entry["command"]))
+    kept = []
+    for argument in given:
+        if argument in ("-o", "-MF", "-MT"):
+            next(given)
+        elif argument not in ("-c", "-MD") and not re.match(r"--generate-code=|.*/ccache$|ccache$", argument):
+            kept.append(argument)
+    return [*kept, "-ptx", "-arch=compute_80", "-MD", "-MF", f"ptx/{name}.d", "-MT", name, "-o", f"ptx/{name}.ptx"]
+
+
+def main():
+    build = pathlib.Path(sys.argv[1]).resolve()
+    jobs = int(sys.argv[2])
+    wanted = re.compile("|".join(sys.argv[3:]))
+    database = json.loads((build / "compile_commands.json").read_text(encoding="utf-8"))
+    entries = {entry["file"]: entry for entry in database if entry["file"].endswith(".cu") and wanted.search(entry["file"])}
+    if not entries:
+        sys.exit("no .cu matches")
+    (build / "ptx").mkdir(exist_ok=True)
+
+    def compile_one(number):
+        entry = list(entries.values())[number]
+        name = f"{pathlib.Path(entry['file']).stem}_{number}"
+        done = subprocess.run(ptx_command(entry, name), cwd=build, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+        (build / "ptx" / f"{name}.ptx").unlink(missing_ok=True)
+        return done.returncode, f"{entry['file']}: {'compiles' if done.returncode == 0 else 'does not compile'}\n{done.stdout}"
+
+    failed = False
+    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+        for code, text in pool.map(compile_one, range(len(entries))):
+            print(text, end="", flush=True)
+            failed = failed or code != 0
+    sys.exit(1 if failed else 0)
+
+
+main()
