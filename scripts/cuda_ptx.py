@@ -3,9 +3,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """cuda_ptx.py BUILD JOBS REGEX...: compiles the .cu of BUILD/compile_commands.json that a REGEX matches to PTX, each once.
 
-nvcc reads all of a file, templates of the host's among them, and generates the kernels' code. What is left out is the
-host's object, ptxas and the link, which take three quarters of the time: a program that nobody can run without a GPU
-needs none of them. The files that each was made of are listed in BUILD/ptx/*.d, in make's form.
+nvcc reads all of a file and generates the kernels' code. What is left out are the host's pass, ptxas and the link, two
+thirds of the time: a program that nobody can run without a GPU needs none of them. Mistakes that only those find, such as
+a symbol that no file defines, are found by `.ci/run nvcc_apart`. The files that each was made of are listed in
+BUILD/ptx/*.d, in make's form.
 """
 
 import concurrent.futures
@@ -39,8 +40,7 @@ def main():
         sys.exit("no .cu matches")
     (build / "ptx").mkdir(exist_ok=True)
 
-    def compile_one(number):
-        entry = list(entries.values())[number]
+    def compile_one(number, entry):
         name = f"{pathlib.Path(entry['file']).stem}_{number}"
         done = subprocess.run(ptx_command(entry, name), cwd=build, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
         (build / "ptx" / f"{name}.ptx").unlink(missing_ok=True)
@@ -48,7 +48,7 @@ def main():
 
     failed = False
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        for code, text in pool.map(compile_one, range(len(entries))):
+        for code, text in pool.map(compile_one, range(len(entries)), entries.values()):
             print(text, end="", flush=True)
             failed = failed or code != 0
     sys.exit(1 if failed else 0)
