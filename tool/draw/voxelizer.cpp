@@ -259,7 +259,14 @@ volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_st
         voxelize_request inside = request;
         inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
         if (inside.solid) inside.solid->is_whole = true;
-        if (request.backend != backend_choice::cpu)
+        const bool only_cpu = request.solid && request.solid->fill == solid_fill::nearest;
+        if (only_cpu) stats.no_cuda = "--fill nearest is drawn on the CPU alone";
+        if (only_cpu && request.backend == backend_choice::cuda)
+            throw backend_error("--backend cuda: " + stats.no_cuda + "; use --backend cpu");
+        if (only_cpu && (request.strategy != voxelpipe::strategy::automatic || request.devices != 1))
+            throw backend_error(std::string(request.devices != 1 ? "--devices" : "--strategy") +
+                                " needs a GPU: " + stats.no_cuda);
+        if (request.backend != backend_choice::cpu && !only_cpu)
             if (std::optional<volume> result = try_cuda(model, inside, stats))
                 return with_ring(std::move(*result), request);
         return with_ring(run_on_cpu(model, inside, stats), request);

@@ -317,7 +317,8 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
 // than LOADED_ROOM when it is loaded, on the CPU. folder: for temporary files. Throws as open_stream() does.
 opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder, double loaded_room) {
     const voxelize_request& request = options.voxelize;
-    const bool is_drawn_here = !request.distance && request.backend != backend_choice::cuda &&
+    const bool needs_dense = request.solid && request.solid->fill == solid_fill::nearest;
+    const bool is_drawn_here = !request.distance && !needs_dense && request.backend != backend_choice::cuda &&
                                request.strategy == voxelpipe::strategy::automatic &&
                                options.storage != storage_choice::dense;
     if (!is_drawn_here) return {};

@@ -159,6 +159,11 @@ void describe_model(CLI::App& app, command_line& options) {
         ->needs(animation)
         ->option_text("T")
         ->group("Model");
+    app.add_option("--variant", options.load.gltf.variant,
+                   "Give the surfaces of a glTF model the materials of this variant of the file, by name "
+                   "(KHR_materials_variants)")
+        ->option_text("NAME")
+        ->group("Model");
     app.add_flag("--lenient", options.load.gltf.lenient,
                  "Go on with a warning where a file breaks the specification in a way that can be put right: unaligned "
                  "data, a node in the scene twice")
@@ -222,9 +227,10 @@ void describe_solids(CLI::App& app, raw_options& raw) {
         ->check(between(0, 64))
         ->option_text("R")
         ->group("Solids");
-    app.add_option("--fill-color", raw.fill_color,
-                   "Colour of the voxels inside: #rrggbb, or mean, that of the surface's voxels. Default: mean")
-        ->option_text("COLOUR")
+    app.add_option("--fill,--fill-color", raw.fill,
+                   "What the voxels inside get: body, the colour and material of the body that they lie in; nearest, "
+                   "those of the nearest triangle; mean, the colour of the surface's voxels; or #rrggbb. Default: body")
+        ->option_text("WHAT")
         ->group("Solids");
 }
 

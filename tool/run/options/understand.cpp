@@ -73,6 +73,32 @@ void understand_batch(command_line& options, bool has_world, bool has_rank) {
     check_rank();
 }
 
+namespace {
+
+// --fill, which is --fill-color too.
+void understand_fill(command_line& options, const std::string& text) {
+    solid_request& solid = *options.voxelize.solid;
+    const std::string word = lower(text);
+    if (text.empty() || word == "body") return;
+    if (word == "mean") {
+        solid.fill = solid_fill::mean;
+    } else if (word == "nearest") {
+        solid.fill = solid_fill::nearest;
+        if (options.storage == storage_choice::sparse)
+            throw usage_error(
+                "--fill nearest does not go with --sparse: the nearest triangle is found in a dense grid");
+        if (options.by_slabs)
+            throw usage_error("--fill nearest is one piece of work: no --resume, and no processes that share a model");
+    } else if (const auto color = parse_color(text); color) {
+        solid.fill = solid_fill::color;
+        solid.fill_color = *color;
+    } else {
+        throw usage_error("--fill takes body, nearest, mean or #rrggbb, not \"" + text + '"');
+    }
+}
+
+} // namespace
+
 void understand_solid(command_line& options, const raw_options& raw) {
     if (raw.coverage) options.voxelize.coverage = *raw.coverage;
     if (!raw.solid && !raw.distance) {
@@ -80,7 +106,7 @@ void understand_solid(command_line& options, const raw_options& raw) {
                                                    {"--close-holes", !raw.close_holes.empty()},
                                                    {"--vote", raw.vote},
                                                    {"--closing", raw.closing.has_value()},
-                                                   {"--fill-color", !raw.fill_color.empty()}};
+                                                   {"--fill", !raw.fill.empty()}};
         for (const auto& [name, is_given] : given)
             if (is_given) throw usage_error(std::string(name) + " goes with --solid");
         return;
@@ -114,9 +140,7 @@ void understand_solid(command_line& options, const raw_options& raw) {
                     raw.close_holes + '"');
         }
     }
-    if (raw.fill_color.empty() || lower(raw.fill_color) == "mean") return;
-    solid.fill_color = parse_color(raw.fill_color);
-    if (!solid.fill_color) throw usage_error("--fill-color takes mean or #rrggbb, not \"" + raw.fill_color + '"');
+    understand_fill(options, raw.fill);
 }
 
 void understand_distance(command_line& options, const raw_options& raw) {
@@ -138,8 +162,8 @@ void understand_distance(command_line& options, const raw_options& raw) {
         throw usage_error("--unsigned has no sign that --solid or a repair could decide: leave out one of them");
     if (raw.coverage) throw usage_error("--distance and --coverage do not go together: distances cover every sample");
     if (raw.extent_of_solid) throw usage_error("--solid-extent does not go with --distance: a sample is inside or not");
-    if (!raw.fill_color.empty())
-        throw usage_error("--fill-color does not go with --distance: colours are those of the nearest triangle");
+    if (!raw.fill.empty())
+        throw usage_error("--fill does not go with --distance: colours are those of the nearest triangle");
     if (raw.iso && !std::isfinite(*raw.iso)) throw usage_error("--iso takes a finite distance");
     if (!raw.band.empty()) {
         distance.is_whole = lower(raw.band) == "whole";
