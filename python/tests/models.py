@@ -114,5 +114,6 @@ def tool():
 
 
 def tool_writes(model, output, *options):
-    subprocess.run([tool(), str(model), "-o", str(output), "-q", *options], check=True)
-    return output
+    """The output's name, and the tool's statistics."""
+    call = [tool(), str(model), "-o", str(output), "-q", "--stats", "json", *options]
+    return output, json.loads(subprocess.run(call, check=True, capture_output=True).stdout)

@@ -41,13 +41,7 @@ def ply(path, v, f, colors, of):
     return path
 
 
-def libraries():
-    yield "trimesh"
-    yield "pyvista"
-    yield "open3d"
-
-
-@pytest.mark.parametrize("library", libraries())
+@pytest.mark.parametrize("library", ["trimesh", "pyvista", "open3d"])
 @pytest.mark.parametrize("of", ["vertex", "face"])
 def test_colours_of_vertices_and_faces(tmp_path, library, of):
     module = pytest.importorskip(library)

@@ -37,9 +37,9 @@ def occupied_of(arrays: dict[str, np.ndarray], occupied: Any) -> np.ndarray:
     return np.asarray(np.logical_or.reduce(masks))
 
 
-def check_shapes(arrays: Mapping[str, np.ndarray], occupied: Any, grid: Grid) -> None:
-    """Raises ValueError for a dense array that does not have the grid's shape."""
-    shapes = {name: a.shape for name, a in arrays.items()}
+def check_shapes(values: Any, arrays: Mapping[str, np.ndarray], occupied: Any, grid: Grid) -> None:
+    """Raises ValueError for one of the dense arrays of `values` that does not have the grid's shape."""
+    shapes = {name if isinstance(values, Mapping) else "values": a.shape for name, a in arrays.items()}
     if occupied is not None:
         shapes["occupied"] = tuple(occupied.shape)
     for name, shape in shapes.items():
@@ -57,7 +57,7 @@ def listed(values: Any, occupied: Any, grid: Grid) -> tuple[np.ndarray, dict[str
                 raise ValueError(f"{name} has {len(a)} rows for {len(voxels)} voxels")
     else:
         arrays = named(values)
-        check_shapes(arrays, occupied, grid)
+        check_shapes(values, arrays, occupied, grid)
         at = np.nonzero(occupied_of(arrays, occupied))
         voxels = np.ascontiguousarray(np.stack(at[::-1], axis=1), np.int32)
         rows = {name: a[at] for name, a in arrays.items()}

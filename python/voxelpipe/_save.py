@@ -95,7 +95,7 @@ def render(
     check_choice("up", up, Up)
     check_threads(threads)
     arrays = named(values)
-    check_shapes(arrays, occupied, grid)
+    check_shapes(values, arrays, occupied, grid)
     shown = np.ascontiguousarray(occupied_of(arrays, occupied)).view(np.uint8)
     colors = next((a for a in arrays.values() if a.ndim == 4 and a.shape[-1] in (3, 4)), None)
     if colors is not None:
@@ -161,7 +161,7 @@ def _write_by_tool(path: str, f: _Format, values: Any, grid: Grid, occupied: Any
         files, _ = _core.write_list(WriteError, path, grid, voxels, channels, *how)
         return list(files)
     arrays = named(values)
-    check_shapes(arrays, occupied, grid)
+    check_shapes(values, arrays, occupied, grid)
     mask = None
     if f.needs_occupancy or any(n == "occupancy" and a.dtype == np.bool_ for n, a in arrays.items()):
         mask = np.ascontiguousarray(occupied_of(arrays, occupied)).view(np.uint8)
@@ -210,7 +210,7 @@ def _write_npy(path: str, values: Any, grid: Grid, extension: str) -> None:
     coords = {"coords": to_numpy(values[0], "voxels")} if is_list(values) else {}
     arrays = named(values[1] if is_list(values) else values)
     if not coords:
-        check_shapes(arrays, None, grid)
+        check_shapes(values, arrays, None, grid)
     if extension == ".npz":
         _check_names(path, arrays, ("origin", "voxel_size", *coords))
     arrays = {**coords, **arrays}
