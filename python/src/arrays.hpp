@@ -78,6 +78,7 @@ void bind_sparse_float(nb::module_& m);
 void bind_sparse_integer(nb::module_& m);
 void bind_files(nb::module_& m);
 void bind_lists(nb::module_& m);
+void bind_octree(nb::module_& m);
 void bind_scene(nb::module_& m);
 
 } // namespace voxelpipe::python

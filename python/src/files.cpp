@@ -1,17 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-#include "arrays.hpp"
+#include "bricks.hpp"
 
 #include "write/formats/formats.hpp"
 #include "write/preview.hpp"
 #include "write/sparse_formats.hpp"
 
-#include <voxelpipe/core/brick_table.hpp>
-
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 
-#include <algorithm>
 #include <optional>
 #include <stdexcept>
 
@@ -168,48 +165,17 @@ nb::tuple write_dense(const nb::handle& write_error, const std::string& path, co
                    [&](const voxelize::write_options& options) { return voxelize::write(v, path, options); });
 }
 
-// Bricks of voxels that are listed in any order; row_of: by rank, where the voxel stands in the list.
-voxelize::sparse_volume bricks_of(const array<const std::int32_t, 2>& voxels, const grid& g,
-                                  std::vector<std::uint64_t>& row_of) {
-    const std::size_t n = voxels.shape(0);
-    std::vector<std::pair<std::uint64_t, std::uint64_t>> order(n); // key of the voxel, row
-    for (std::size_t i = 0; i < n; ++i) {
-        const std::int32_t* p = voxels.data() + 3 * i;
-        const glm::ivec3 voxel(p[0], p[1], p[2]);
-        if (!g.contains(voxel))
-            throw std::out_of_range("voxel " + std::to_string(i) + " is (" + std::to_string(p[0]) + ", " +
-                                    std::to_string(p[1]) + ", " + std::to_string(p[2]) +
-                                    ") (x, y, z), which lies outside the grid");
-        order[i] = {core::morton_key(voxel), i};
-    }
-    std::sort(order.begin(), order.end());
-    voxelize::sparse_volume b;
-    b.shape = shape_of_grid(g);
-    row_of.reserve(n);
-    for (std::size_t i = 0; i < n; ++i) {
-        const auto [key, row] = order[i];
-        if (i != 0 && order[i - 1].first == key)
-            throw std::invalid_argument("voxels " + std::to_string(order[i - 1].second) + " and " +
-                                        std::to_string(row) + " are the same");
-        if (b.keys.empty() || b.keys.back() != key >> 9) {
-            b.keys.push_back(key >> 9);
-            b.masks.emplace_back();
-            b.offsets.push_back(i);
-        }
-        b.masks.back().words[(key & 511u) >> 6] |= std::uint64_t{1} << (key & 63u);
-        row_of.push_back(row);
-    }
-    if (n != 0) b.offsets.push_back(n);
-    return b;
-}
-
 // A list of voxels (n, 3) with a row of each array for each. The channel "occupancy" is added.
-nb::tuple write_list(const nb::handle& write_error, const std::string& path, const grid& g,
-                     const array<const std::int32_t, 2>& voxels, const named_arrays& channels, int compression,
-                     bool merge, bool points, bool levels, int pieces, const std::string& up, unsigned threads) {
-    if (voxels.shape(1) != 3) throw nb::value_error("voxels are an array (n, 3) with columns x, y, z");
-    std::vector<std::uint64_t> row_of;
-    voxelize::sparse_volume v = bricks_of(voxels, g, row_of);
+nb::tuple write_list(const nb::handle& write_error, const std::string& path, const grid& g, const voxel_array& voxels,
+                     const named_arrays& channels, int compression, bool merge, bool points, bool levels, int pieces,
+                     const std::string& up, unsigned threads) {
+    listed_bricks listed = bricks_of(voxels, g, glm::ivec3(0));
+    const std::vector<std::uint64_t>& row_of = listed.row_of;
+    voxelize::sparse_volume v;
+    v.shape = shape_of_grid(g);
+    v.keys = std::move(listed.keys);
+    v.masks = std::move(listed.masks);
+    v.offsets = std::move(listed.offsets);
     v.channels.push_back({"occupancy", voxelize::scalar::bit, 1, {}});
     for (const auto& [name, a] : channels) {
         if (a.ndim() < 1 || a.shape(0) != voxels.shape(0))

@@ -1,8 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-#include "arrays.hpp"
-
-#include <voxelpipe/grid.hpp>
+#include "bricks.hpp"
 
 #include <cpu_ref/parallel.hpp>
 
@@ -15,7 +13,6 @@
 namespace voxelpipe::python {
 namespace {
 
-using voxel_array = nb::ndarray<const std::int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using row_array = nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>;
 using dense_array = nb::ndarray<nb::c_contig, nb::device::cpu>;
 
@@ -74,9 +71,8 @@ void scatter(const voxel_array& voxels, const row_array& values, const grid& g, 
         }
     }
     if (const std::size_t i = outside; i != n)
-        throw nb::index_error(("voxel " + std::to_string(i) + " is (" + std::to_string(all[3 * i]) + ", " +
-                               std::to_string(all[3 * i + 1]) + ", " + std::to_string(all[3 * i + 2]) +
-                               ") (x, y, z), which lies outside the grid of " + std::to_string(g.extent.x) + " x " +
+        throw nb::index_error(("voxel " + std::to_string(i) + " is " + voxel_text(all + 3 * i) +
+                               ", which lies outside the grid of " + std::to_string(g.extent.x) + " x " +
                                std::to_string(g.extent.y) + " x " + std::to_string(g.extent.z))
                                   .c_str());
 }

@@ -13,5 +13,6 @@ NB_MODULE(_core, m) {
     python::bind_sparse_integer(m);
     python::bind_files(m);
     python::bind_lists(m);
+    python::bind_octree(m);
     python::bind_scene(m);
 }

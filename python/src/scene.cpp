@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene.hpp"
 
-#include "model/finite.hpp"
 #include "read/assimp/linear_color.hpp"
 #include "read/assimp_scene.hpp"
 #include "read/mesh/mesh_formats.hpp"
@@ -51,13 +50,15 @@ std::vector<std::string> files_of(const std::string& path) {
 // ---- scenes of arrays ----------------------------------------------------------------------------------------------
 
 using texcoord_array = nb::ndarray<const float, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
+using line_array = nb::ndarray<const std::uint32_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
 using linear_array = nb::ndarray<const float, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu>;
 using picture_array = nb::ndarray<const std::uint8_t, nb::shape<-1, -1, 4>, nb::c_contig, nb::device::cpu>;
 
 // Name, positions, their origin, triangles, texture coordinates from the picture's top left corner, linear colours of
-// vertices, number of the material.
-using part_tuple = std::tuple<std::string, position_array, std::array<double, 3>, triangle_array,
-                              std::optional<texcoord_array>, std::optional<linear_array>, std::uint32_t>;
+// vertices, number of the material; (l, 2) vertices of lines.
+using part_tuple =
+    std::tuple<std::string, position_array, std::array<double, 3>, triangle_array, std::optional<texcoord_array>,
+               std::optional<linear_array>, std::uint32_t, std::optional<line_array>>;
 // Name, linear colour, number of the texture or -1, "opaque", "mask" or "blend", the mask's limit, double-sided.
 using material_tuple = std::tuple<std::string, std::array<float, 4>, std::int32_t, std::string, float, bool>;
 // Number of the picture, "repeat", "clamp" or "mirror" along u and v, "linear" or "nearest".
@@ -70,7 +71,7 @@ std::vector<T> list_of(const Array& a) {
 }
 
 voxelize::primitive primitive_of(const part_tuple& part, std::size_t num_materials) {
-    const auto& [name, positions, origin, triangles, texcoords, colors, material] = part;
+    const auto& [name, positions, origin, triangles, texcoords, colors, material, lines] = part;
     voxelize::primitive made;
     made.name = name;
     made.positions = list_of<glm::vec3>(positions);
@@ -81,6 +82,14 @@ voxelize::primitive primitive_of(const part_tuple& part, std::size_t num_materia
             throw std::out_of_range("triangle " + std::to_string(i) + " is (" + std::to_string(t.x) + ", " +
                                     std::to_string(t.y) + ", " + std::to_string(t.z) + "), the mesh has " +
                                     std::to_string(made.positions.size()) + " vertices");
+    }
+    if (lines) made.lines = list_of<glm::uvec2>(*lines);
+    for (std::size_t i = 0; i < made.lines.size(); ++i) {
+        const glm::uvec2& l = made.lines[i];
+        if (std::max(l.x, l.y) >= made.positions.size())
+            throw std::out_of_range("line " + std::to_string(i) + " is (" + std::to_string(l.x) + ", " +
+                                    std::to_string(l.y) + "), there are " + std::to_string(made.positions.size()) +
+                                    " vertices");
     }
     if (texcoords) made.texcoords = list_of<glm::vec2>(*texcoords);
     if (colors) made.colors = list_of<glm::vec4>(*colors);
@@ -142,6 +151,24 @@ model_scene scene_of(const std::vector<part_tuple>& parts, const std::vector<mat
     return made;
 }
 
+using transform_array = nb::ndarray<const double, nb::shape<-1, 3, 4>, nb::c_contig, nb::device::cpu>;
+
+// The scene once for each transform, rows of a matrix to be multiplied by (x, y, z, 1). Meshes are kept once.
+model_scene instances_of(const model_scene& s, const transform_array& transforms) {
+    model_scene made{s.scene};
+    made.scene.instances.clear();
+    for (std::size_t n = 0; n < transforms.shape(0); ++n) {
+        voxelize::affine placed;
+        const double* const row = transforms.data() + 12 * n;
+        for (std::size_t r = 0; r < 3; ++r)
+            for (std::size_t c = 0; c < 4; ++c) placed.m[r][c] = row[4 * r + c];
+        if (!placed.is_finite()) throw nb::value_error(("transform " + std::to_string(n) + " is not finite").c_str());
+        for (const voxelize::instance& shown : s.scene.instances)
+            made.scene.instances.push_back({shown.primitive, placed.after(shown.to_world)});
+    }
+    return made;
+}
+
 // sRGB and alpha, 0 to 1, as the readers of formats with such colours take them.
 nb::object linear_colors(const linear_array& encoded) {
     std::vector<glm::vec4> colors = list_of<glm::vec4>(encoded);
@@ -198,6 +225,7 @@ void bind_scene(nb::module_& m) {
         .def_static("is_read", &is_read, nb::arg("extension"))
         .def_static("files_of", &files_of, nb::arg("path"))
         .def_static("of", &scene_of, nb::arg("parts"), nb::arg("materials"), nb::arg("textures"), nb::arg("pictures"))
+        .def("instances", &instances_of, nb::arg("transforms"))
         .def_static("linear_colors", &linear_colors, nb::arg("encoded"))
         .def_prop_ro("materials", &materials_of)
         .def_prop_ro("textures", &textures_of)

@@ -37,5 +37,5 @@ def mistakes(vertices: Array, triangles: npt.NDArray[np.int64], grid: vp.Grid) -
     vp.voxelize(5, grid)  # type: ignore[call-overload]
     vp.save("a.npy", vp.voxelize(mesh, grid), grid, nonsense=1)  # type: ignore[call-arg]
     vp.bake(mesh, grid, {"rgb": vertices}, blend="median")  # type: ignore[call-overload]
-    vp.bake(mesh, grid, "colour")  # type: ignore[call-overload]
+    vp.bake(mesh, grid, "colour")  # type: ignore[arg-type]
     vp.fit(mesh, "64")  # type: ignore[arg-type]

@@ -25,10 +25,12 @@ from ._core import Grid
 from ._distance import distance, distance_at
 from ._fit import fit
 from ._model import Material, Model, ModelWarning, Part, Texture, load_model
+from ._octree import Hits, Octree
 from ._save import WriteError, formats, render, save
 from ._solid import OpenMeshWarning, solid, tiles
 from ._surface import DroppedTrianglesWarning, Fragments, fragments, voxelize
 from ._view import View, view
+from ._visuals import instances, lines, points
 
 try:
     __version__ = _version("voxelpipe")
@@ -39,9 +41,11 @@ __all__ = [
     "DroppedTrianglesWarning",
     "Fragments",
     "Grid",
+    "Hits",
     "Material",
     "Model",
     "ModelWarning",
+    "Octree",
     "OpenMeshWarning",
     "Part",
     "Texture",
@@ -55,7 +59,10 @@ __all__ = [
     "fit",
     "formats",
     "fragments",
+    "instances",
+    "lines",
     "load_model",
+    "points",
     "render",
     "save",
     "solid",

@@ -15,7 +15,7 @@ from ._arrays import is_torch
 from ._axes import VoxelList, scattered
 from ._core import Grid
 from ._device import DeviceMesh
-from ._mesh import Mesh, as_mesh
+from ._mesh import Mesh, ModelMesh, as_mesh
 from ._solid import solid_voxels
 from ._surface import listed_for, take_counts
 from ._types import (
@@ -122,6 +122,9 @@ def _passes(a: _Attribute) -> list[tuple[int, int]]:
 def _drawn(m: Mesh, grid: Grid, attributes: list[_Attribute], coverage: str,
            threads: int) -> tuple[np.ndarray, list[np.ndarray], dict[str, int]]:  # fmt: skip
     """The voxels of the surface, and each attribute in them, typed."""
+    if not attributes and isinstance(m, ModelMesh) and m.scene.is_more_than_triangles:
+        voxels, _, report, _ = m.scene.draw(grid, coverage, [], threads)
+        return voxels, [], report
     positions, where = m.positions(grid)
     if not attributes:
         voxels, report = _core.sparse_voxels(positions, m.triangles, where, coverage, threads)

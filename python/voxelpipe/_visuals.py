@@ -39,7 +39,7 @@ class _Scene:
         return len(self.materials) - 1
 
     def add_part(self, vertices: Any, triangles: Any, material: int, *, uv: Any = None, colors: Any = None,
-                 face_colors: Any = None, corner_uv: Any = None) -> None:  # fmt: skip
+                 face_colors: Any = None, corner_uv: Any = None, lines: Any = None) -> None:  # fmt: skip
         """colors, face_colors: linear, (n, 4). Values of faces and corners give each triangle vertices of its own."""
         v, origin = _placed(vertices)
         t = np.ascontiguousarray(triangles)
@@ -62,8 +62,12 @@ class _Scene:
                 None if uv is None else np.ascontiguousarray(uv, np.float32),
                 None if colors is None else np.ascontiguousarray(colors, np.float32),
                 material,
+                lines,
             )
         )
+
+    def made(self) -> Any:
+        return _core.Scene.of(self.parts, self.materials, self.textures, self.pictures)
 
 
 def _placed(vertices: Any) -> tuple[np.ndarray, tuple[float, float, float]]:
@@ -235,4 +239,76 @@ def own_scene(mesh: Any, needs_colors: bool, stacklevel: int) -> Any:
         _add(scene, part)
     if needs_colors and not scene.has_colors:
         raise ValueError("the mesh has no colours of its own: give values, such as {'rgb': an array with a row for each vertex}")
-    return _core.Scene.of(scene.parts, scene.materials, scene.textures, scene.pictures)
+    return scene.made()
+
+
+def lines(vertices: Any, segments: Any, colors: Any = None) -> Model:
+    """Line segments as a Model, for voxelize(), sparse() and bake(): their voxels are those that a segment touches.
+
+    Args:
+        vertices: (v, 3) positions.
+        segments: (s, 2) vertex numbers.
+        colors: of the vertices, (v, 3 or 4), sRGB, uint8 or floats from 0 to 1; for bake(model, grid).
+
+    Raises:
+        IndexError: a segment names a vertex that does not exist.
+
+    Example:
+        >>> wires = vp.lines(vertices, mesh.edges_unique)
+        >>> occupied = vp.voxelize(wires, vp.fit(wires, 128))
+    """
+    v = np.asarray(to_numpy(vertices, "vertices"))
+    pairs = np.asarray(to_numpy(segments, "segments"))
+    if v.ndim != 2 or v.shape[1] != 3:
+        raise ValueError(f"vertices are an array (v, 3), not {v.shape}")
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":
+        raise ValueError(f"segments are an array (s, 2) of vertex numbers, not {pairs.shape} of {pairs.dtype}")
+    bad = ((pairs < 0) | (pairs >= len(v))).any(axis=1)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise IndexError(f"segment {row} is {tuple(int(i) for i in pairs[row])}, there are {len(v)} vertices")
+    linear = None if colors is None else _linear(colors)
+    if linear is not None and len(linear) != len(v):
+        raise ValueError(f"colors has {len(linear)} rows for {len(v)} vertices")
+    scene = _Scene()
+    none = np.zeros((0, 3), np.uint32)
+    scene.add_part(v, none, scene.add_material(), colors=linear, lines=np.ascontiguousarray(pairs, np.uint32))
+    return Model("lines", scene.made())
+
+
+def points(positions: Any, colors: Any = None) -> Model:
+    """Points as a Model, for voxelize(), sparse() and bake(): their voxels are those in which a point lies; of one in the
+    side of a voxel, all that it touches.
+
+    Args:
+        positions: (n, 3).
+        colors: (n, 3 or 4), sRGB, uint8 or floats from 0 to 1; for bake(model, grid), which has their mean.
+
+    Example:
+        >>> cloud = vp.points(xyz, rgb)
+        >>> voxels, rows = vp.sparse(cloud, vp.fit(cloud, voxel_size=0.05), "color")
+    """
+    n = np.arange(len(positions))
+    return Model("points", lines(positions, np.stack([n, n], axis=1), colors)._scene)
+
+
+def instances(mesh: Any, transforms: Any) -> Model:
+    """A mesh at many places, each once in memory, as a Model, with its own colours where it has any.
+
+    Args:
+        mesh: what voxelize() takes, on the CPU.
+        transforms: (n, 4, 4) or (n, 3, 4) matrices, which are multiplied by (x, y, z, 1).
+
+    Example:
+        >>> forest = vp.instances("tree.glb", matrices)
+        >>> color = vp.bake(forest, vp.fit(forest, 512))["color"]
+    """
+    m = np.asarray(to_numpy(transforms, "transforms"), np.float64)
+    if m.ndim == 2:
+        m = m[None]
+    if m.ndim != 3 or m.shape[1:] not in ((4, 4), (3, 4)):
+        raise ValueError(f"transforms are matrices (n, 4, 4) or (n, 3, 4), not an array {m.shape}")
+    if m.shape[1] == 4 and not (m[:, 3] == (0, 0, 0, 1)).all():
+        raise ValueError("transforms end with the row (0, 0, 0, 1)")
+    scene = own_scene(mesh, False, 2)
+    return Model("instances", scene.instances(np.ascontiguousarray(m[:, :3])))
