@@ -43,8 +43,9 @@ CPP = {
 }
 # Shown nowhere: what the library uses to write NanoVDB files.
 HIDDEN = ["sparse/io/nanovdb_nodes.hpp"]
-PYTHON = ["Grid", "fit", "voxelize", "solid", "bake", "sparse", "fragments", "Fragments", "save", "render", "view", "View",
-          "DroppedTrianglesWarning", "OpenMeshWarning"]
+PYTHON = ["Grid", "fit", "load_model", "Model", "Material", "Texture", "Part", "voxelize", "solid", "tiles", "distance", "distance_at",
+          "bake", "sparse", "dense", "VoxelList", "lines", "points", "instances", "Octree", "Hits", "fragments", "Fragments", "save", "formats", "render", "view", "View",
+          "DroppedTrianglesWarning", "OpenMeshWarning", "ModelWarning", "WriteError"]
 
 
 def heading(text, line="="):

@@ -9,7 +9,7 @@ project = "VoxelPipe"
 author = "The VoxelPipe authors"
 copyright = "2026 The VoxelPipe authors"
 version = release = os.environ["VOXELPIPE_VERSION"]
-extensions = ["myst_parser", "breathe", "sphinx.ext.autodoc"]
+extensions = ["myst_parser", "breathe", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 html_theme = "furo"
 html_title = f"VoxelPipe {release}"
