@@ -139,9 +139,17 @@ TEST(Messages, TargetsThatNoOutputHoldsAreAWarning) {
     EXPECT_EQ("", warnings({"-t", "color", "-o", folder / "a.binvox", "-o", folder / "a.npy"}));
     EXPECT_EQ("", warnings({"-t", "color", "-o", folder / "a.vox"}));
     EXPECT_EQ("", warnings({"-o", folder / "a.binvox"}));
-    const std::string depth = warnings({"-t", "depth,occupancy", "-o", folder / "a.png"});
+    const std::string depth = warnings({"-t", "depth,occupancy", "-o", folder / "a.vox"});
     EXPECT_EQ(1, lines_of(depth)) << depth;
     EXPECT_NE(std::string::npos, depth.find("--target depth")) << depth;
+    // A picture shows colours, or else the first of the other values.
+    EXPECT_EQ("", warnings({"-t", "occupancy,depth", "-o", folder / "a.png"}));
+    for (const char* targets : {"count,depth", "color,depth"}) {
+        const std::string second = warnings({"-t", targets, "-o", folder / "a.png"});
+        EXPECT_EQ(1, lines_of(second)) << second;
+        EXPECT_NE(std::string::npos, second.find("--target depth")) << second;
+    }
+    EXPECT_EQ(1, lines_of(warnings({"-t", "depth", "--no-color", "-o", folder / "a.png"})));
 }
 
 TEST(Messages, ExtensionsOfTheSameKindAreOneWarning) {

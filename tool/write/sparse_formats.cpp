@@ -303,7 +303,7 @@ std::vector<std::filesystem::path> write_sparse_png(const sparse_volume& v, cons
     const preview_bricks bricks{v.keys.data(), v.masks.empty() ? nullptr : v.masks.front().words, v.offsets.data(),
                                 v.keys.size()};
     return write_picture(path, options, [&](const preview_options& preview) {
-        return render_preview(v.shape, bricks, find_colors(v.channels), preview, options.progress);
+        return render_preview(v.shape, bricks, find_shown(v.channels), preview, options.progress);
     });
 }
 

@@ -257,12 +257,17 @@ void understand_outputs(command_line& options, const raw_options& raw) {
                               "depth and nearest, those of the nearest triangle");
         if (std::find(targets.begin(), targets.end(), *id) == targets.end()) targets.push_back(*id);
     }
+    // What a picture shows (find_shown() of preview.hpp): colours, or else the first of the other values.
+    const auto has_values = [](target id) { return id != target::occupancy && id != target::distance; };
+    const auto pictured = std::find_if(targets.begin(), targets.end(), has_values);
+    const bool shows_values = !raw.no_color && std::none_of(targets.begin(), targets.end(), is_color);
     for (const target id : targets) {
         const std::string_view name = info_of(id).name;
         const bool held = std::any_of(options.outputs.begin(), options.outputs.end(), [&](const auto& output) {
             const format* const found = find_format(output);
             return id == target::occupancy || id == target::distance || found->all_channels ||
-                   (found->shows_colors && is_color(id));
+                   (found->shows_colors && is_color(id)) ||
+                   (found->extension == ".png" && shows_values && id == *pictured);
         });
         if (!held)
             options.warnings.push_back("--target " + std::string(name) +
