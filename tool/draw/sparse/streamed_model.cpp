@@ -150,7 +150,7 @@ public:
     [[nodiscard]] std::vector<std::size_t> parts() const {
         return holes_ ? holes_->parts() : std::vector<std::size_t>();
     }
-    // Of draws of these parts.
+    // The state that draws of these parts carry on.
     [[nodiscard]] known_bodies of(std::span<const std::size_t> parts) const {
         known_bodies made;
         if (!fills_) return made;
