@@ -100,7 +100,7 @@ program=$(find_program "${program:-$build/tests/golden/golden_hashes$suffix}")
 
 # The tool's cases: name, model, output, options.
 tool_cases() {
-    local format coverage target solid
+    local format coverage target solid fill
     # Every format, of colours where it shows them; and of several values where it holds them.
     for format in npy npz vox schem binvox vti nrrd zarr glb obj ply stl xyz html nvdb; do
         printf 'file.%s model.glb out.%s -r 40\n' "$format" "$format"
@@ -125,6 +125,9 @@ tool_cases() {
     done
     for solid in nonzero even_odd positive each_draw exterior; do
         printf 'solid.tool.%s model.glb out.npz -r 36 --solid %s -t occupancy,color,count\n' "$solid" "$solid"
+    done
+    for fill in body mean nearest; do
+        printf 'solid.tool.fill_%s model.glb out.npz -r 28 --solid nonzero --fill %s -t color,material\n' "$fill" "$fill"
     done
     printf 'solid.tool.inner model.glb out.npy -r 36 --solid nonzero --solid-extent inner\n'
     printf 'solid.tool.close_holes open.stl out.npy -r 36 --solid even_odd --close-holes\n'

@@ -232,8 +232,7 @@ TEST(Fill, BodiesAreTheSameInSlabs) {
                                    {{16, 8, 8}, {64, 56, 72}, false, {0, 255, 0}},
                                    {{5, 5, 60}, {61, 61, 95}, true, {0, 0, 255}},
                                    {{32, 0, 0}, {64, 32, 32}, false, {255, 0, 0}}});
-    const std::vector<std::vector<std::string>> rules{
-        {"nonzero"}, {"nonzero", "--vote"}, {"exterior", "--padding", "3"}};
+    const std::vector<std::vector<std::string>> rules{{"nonzero"}, {"exterior", "--padding", "3"}};
     for (const std::vector<std::string>& rule : rules) {
         SCOPED_TRACE(rule.front() + std::to_string(rule.size()));
         const auto draw = [&](const std::string& out, const std::vector<std::string>& more) {
@@ -299,7 +298,6 @@ TEST(Fill, NearestTakesTheNearestTriangle) {
                     ASSERT_EQ(static_cast<int>(nearest), voxels.material_at({x, y, z}));
                     ASSERT_EQ(glm::u8vec4(colors[nearest], 255), voxels.color_at({x, y, z}));
                 }
-        EXPECT_EQ(-1, voxels.material_at({14, 14, 14}));
     }
     const auto expect = [&](int code, const std::vector<std::string>& more, const std::string& why) {
         std::vector<std::string> arguments{folder / "m.glb", "-s", "1", "--solid", "nonzero", "--fill", "nearest"};
