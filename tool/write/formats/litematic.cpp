@@ -83,7 +83,7 @@ nbt tail() {
     return after;
 }
 
-// Numbers of so many bits, the first in the lowest bits, as whole 64-bit integers.
+// Numbers of `bits` bits each, the first in the lowest bits, as whole 64-bit integers.
 std::vector<std::byte> packed(std::span<const std::uint16_t> numbers, unsigned bits) {
     constexpr std::size_t long_bits = 64;
     std::vector<std::byte> bytes;
