@@ -102,7 +102,7 @@ program=$(find_program "${program:-$build/tests/golden/golden_hashes$suffix}")
 tool_cases() {
     local format coverage target solid fill
     # Every format, of colours where it shows them; and of several values where it holds them.
-    for format in npy npz vox schem binvox vti nrrd zarr glb obj ply stl xyz html nvdb; do
+    for format in npy npz vox schem litematic binvox vti nrrd zarr glb obj ply stl 3mf xyz html nvdb; do
         printf 'file.%s model.glb out.%s -r 40\n' "$format" "$format"
     done
     for format in npy npz vti nrrd zarr html nvdb; do
@@ -114,7 +114,7 @@ tool_cases() {
     printf 'file.npz.sparse model.glb out.npz -r 40 --sparse -t color,triangle\n'
     printf 'file.npy.sparse model.glb out.npy -r 40 --sparse\n'
     printf 'file.ply.points model.glb out.ply -r 40 --points\n'
-    for format in glb obj ply stl; do printf 'file.%s.merge model.glb out.%s -r 40 --merge\n' "$format" "$format"; done
+    for format in glb obj ply stl 3mf; do printf 'file.%s.merge model.glb out.%s -r 40 --merge\n' "$format" "$format"; done
     # Without an angle, so that the picture takes no sine, which differs between machines.
     printf 'file.png model.glb out.png -r 24 --image-size 96x72 --azimuth 0 --elevation 0 --fov 0\n'
     for target in occupancy count color color-max color-replace color-outer normal material triangle depth; do

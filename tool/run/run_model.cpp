@@ -12,6 +12,7 @@
 #include "read/model_file.hpp"
 #include "run_outputs.hpp"
 #include "slab_run.hpp"
+#include "write/formats/blocks.hpp"
 #include "write/level_set.hpp"
 #include "write/sparse_formats.hpp"
 #include "write_bytes.hpp"
@@ -287,8 +288,12 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
         report.warnings.push_back("no sample of the grid lies within the band of --distance around the model");
 
     start = clock::now();
+    const std::shared_ptr<const block_list> blocks =
+        options.blocks ? with_materials(*options.blocks, options.block_file, report.materials, report.warnings)
+                       : nullptr;
     for (const std::filesystem::path& output : options.outputs) {
         write_options how = options.write;
+        how.blocks = blocks;
         how.lists = storage.lists;
         bar.start("writing " + output.filename().string());
         how.progress = [&bar](double done) { bar.show(done); };

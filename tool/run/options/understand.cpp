@@ -3,6 +3,9 @@
 #include "draw/distance/distance_voxelizer.hpp"
 #include "raw_options.hpp"
 #include "values.hpp"
+#include "write/formats/blocks.hpp"
+
+#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
@@ -11,6 +14,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <initializer_list>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -181,7 +185,7 @@ void understand_distance(command_line& options, const raw_options& raw) {
     if (options.write.levels) throw usage_error("--levels does not go with --distance: distances have no mip levels");
     if (options.write.pieces != 0)
         for (const std::filesystem::path& output : options.outputs)
-            if (lower(output.extension().string()) == ".nvdb")
+            if (lower_extension(output) == ".nvdb")
                 throw usage_error("--pieces does not go with --distance and .nvdb: a level set is one grid");
 }
 
@@ -216,13 +220,23 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     bool shows_colors = false;
     bool needs_occupancy = false;
     for (const std::filesystem::path& output : options.outputs) {
+        if (output == "-") throw usage_error("-o -: standard output needs its format before a colon, as in -o npy:-");
         const format* found = find_format(output);
-        if (found == nullptr && lower(output.extension().string()) == ".vdb")
+        if (found == nullptr && lower_extension(output) == ".vdb")
             throw usage_error("\"" + output.string() +
                               "\": this program was built without OpenVDB (libopenvdb-dev); .nvdb needs no library");
         if (found == nullptr) {
             throw usage_error("\"" + output.string() + "\": the extension of an output must be one of " +
                               names(formats(), &format::extension));
+        }
+        if (is_standard_output(output)) {
+            if (std::count_if(options.outputs.begin(), options.outputs.end(), is_standard_output) > 1)
+                throw usage_error("\"" + output.string() + "\": standard output takes one output");
+            if (const std::string_view why = why_no_stream(*found); !why.empty())
+                throw usage_error("\"" + output.string() + "\": " + std::string(found->extension) +
+                                  " cannot go to standard output: " + std::string(why));
+            if (isatty(STDOUT_FILENO) != 0)
+                throw usage_error("\"" + output.string() + "\": standard output is a terminal; redirect it");
         }
         if (std::count(options.outputs.begin(), options.outputs.end(), output) > 1)
             throw usage_error("\"" + output.string() + "\" is given twice");
@@ -237,11 +251,19 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     const auto require = [&](bool given, const char* option, const char* what, const char* who, bool format::*has) {
         if (given && std::none_of(options.outputs.begin(), options.outputs.end(),
                                   [&](const auto& output) { return find_format(output)->*has; }))
-            throw usage_error(std::string(option) + ": " + lower(options.outputs.front().extension().string()) +
-                              " has no " + what + "; " + who);
+            throw usage_error(std::string(option) + ": " + lower_extension(options.outputs.front()) + " has no " +
+                              what + "; " + who);
     };
     require(options.write.levels, "--levels", "levels", ".zarr has", &format::has_levels);
     require(options.write.pieces != 0, "--pieces", "pieces", ".pvti and .nvdb have", &format::has_pieces);
+    require(!options.block_file.empty(), "--blocks", "blocks", ".schem and .litematic have", &format::has_blocks);
+    if (!options.block_file.empty()) {
+        try {
+            options.blocks = std::make_shared<block_list>(read_block_list(options.block_file));
+        } catch (const block_list_error& error) {
+            throw usage_error(std::string("--blocks ") + error.what());
+        }
+    }
     if (options.max_memory != 0)
         options.write.piece_bytes = std::min(options.write.piece_bytes, options.max_memory / 4);
     std::vector<target>& targets = options.voxelize.targets;
@@ -282,6 +304,9 @@ void understand_outputs(command_line& options, const raw_options& raw) {
         targets.push_back(target::occupancy);
         if (shows_colors && !raw.no_color) options.implied.push_back(target::color);
     }
+    if (options.blocks && !options.blocks->materials.empty() &&
+        std::find(targets.begin(), targets.end(), target::material) == targets.end())
+        options.implied.push_back(target::material);
     if (needs_occupancy && std::find(targets.begin(), targets.end(), target::occupancy) == targets.end())
         options.implied.push_back(target::occupancy);
     targets.insert(targets.end(), options.implied.begin(), options.implied.end());

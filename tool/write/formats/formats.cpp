@@ -20,6 +20,7 @@
 #include "write/page/page.hpp"
 #include "write/sparse_formats.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -123,6 +124,14 @@ const format* find_format(const std::filesystem::path& path) {
     for (const format& f : all_formats)
         if (f.extension == extension) return &f;
     return nullptr;
+}
+
+std::string_view why_no_stream(const format& f) {
+    constexpr std::array<std::string_view, 4> seek{".npz", ".vti", ".3mf", ".vdb"};
+    if (std::find(seek.begin(), seek.end(), f.extension) != seek.end())
+        return "it has what is known only at the end before what comes earlier";
+    if (f.extension == ".pvti" || f.extension == ".zarr") return "it is several files";
+    return {};
 }
 
 std::vector<std::filesystem::path> write(const volume& v, const std::filesystem::path& path,

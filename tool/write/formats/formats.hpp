@@ -69,6 +69,9 @@ struct format {
 // In the order in which --help lists them.
 [[nodiscard]] std::span<const format> formats();
 
+// Why files of the format cannot go to standard output: "it ..."; empty if they can.
+[[nodiscard]] std::string_view why_no_stream(const format& f);
+
 // By the extension of the path, in either case; null when no writer has it.
 [[nodiscard]] const format* find_format(const std::filesystem::path& path);
 

@@ -46,7 +46,7 @@ void add_block(nbt& tree, std::string_view block) {
 }
 
 // All up to the blocks themselves.
-nbt head_of(const block_grid& grid, std::int64_t occupied) {
+nbt litematic_head(const block_grid& grid, std::int64_t occupied) {
     nbt head;
     head.begin(nbt::compound, "");
     constexpr int minecraft_1_13 = 1519; // as in .schem
@@ -77,13 +77,13 @@ nbt head_of(const block_grid& grid, std::int64_t occupied) {
     return head;
 }
 
-nbt tail() {
+nbt litematic_tail() {
     nbt after;
     for (int open = 0; open < 3; ++open) after.finish(); // the region, the regions and the whole
     return after;
 }
 
-// Numbers of BITS bits each, the first in the lowest bits, as whole 64-bit integers.
+// Numbers of `bits` bits each, the first in the lowest bits, as whole 64-bit integers.
 std::vector<std::byte> packed(std::span<const std::uint16_t> numbers, unsigned bits) {
     constexpr std::size_t long_bits = 64;
     std::vector<std::byte> bytes;
@@ -114,7 +114,7 @@ std::vector<std::filesystem::path> write_litematic(const voxel_shape& v, const s
         throw write_error(path, "too large for .litematic, which ends at 2^31 - 1 blocks; use .npz, .vti or .nrrd");
     const unsigned bits = bits_of(grid.list());
     return write_block_file(
-        grid, head_of(grid, static_cast<std::int64_t>(v.num_voxels())), tail(),
+        grid, litematic_head(grid, static_cast<std::int64_t>(v.num_voxels())), litematic_tail(),
         [bits](std::span<const std::uint16_t> numbers) { return packed(numbers, bits); }, path, options);
 }
 

@@ -198,7 +198,7 @@ written_names mesh_names(const volume& shape, const std::filesystem::path& path,
                                     : extension == ".3mf" ? max_3mf_faces
                                                           : max_faces;
     const auto most = static_cast<double>(most_faces(of_format, options));
-    if (faces > most)
+    if (faces > most && !is_standard_output(path))
         names.numbered.push_back({path.parent_path(), path.stem().string() + ".", path.extension().string(),
                                   static_cast<std::uint64_t>(std::ceil(faces / most))});
     return names;

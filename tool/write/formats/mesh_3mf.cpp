@@ -44,6 +44,12 @@ public:
         colors_.erase(std::unique(colors_.begin(), colors_.end()), colors_.end());
     }
 
+    // True if the text may have 4 GiB or more.
+    [[nodiscard]] bool is_large() const {
+        constexpr std::uint64_t most_of_line = 128; // of a vertex or a triangle
+        return (mesh_.vertices.size() + 2 * faces_.size() + colors_.size() + 16) * most_of_line > 0xffff'ffffU;
+    }
+
     // Calls USE(n, MAKE(std::string text)) for all pieces: MAKE on all threads.
     template <class Make, class Use>
     void for_each_piece(const Make& make, const Use& use) const {
@@ -127,7 +133,8 @@ private:
 };
 
 void add_small(zip_archive& archive, const std::string& name, std::string_view text) {
-    archive.add(name, [&](const entry_sink& add) { add(std::as_bytes(std::span{text})); });
+    archive.add(
+        name, [&](const entry_sink& add) { add(std::as_bytes(std::span{text})); }, false);
 }
 
 void write_package(output_file& out, const model_text& model, const write_options& options,
@@ -137,29 +144,35 @@ void write_package(output_file& out, const model_text& model, const write_option
     add_small(archive, "_rels/.rels", relationships);
     const std::string name = "3D/3dmodel.model";
     if (options.compression == 0) {
-        archive.add(name, [&](const entry_sink& add) {
-            model.for_each_piece([](std::string text) { return text; },
-                                 [&](std::size_t, const std::string& text) {
-                                     add(std::as_bytes(std::span{text}));
-                                     piece_done();
-                                 });
-        });
+        archive.add(
+            name,
+            [&](const entry_sink& add) {
+                model.for_each_piece([](std::string text) { return text; },
+                                     [&](std::size_t, const std::string& text) {
+                                         add(std::as_bytes(std::span{text}));
+                                         piece_done();
+                                     });
+            },
+            model.is_large());
     } else {
-        archive.add_compressed(name, [&](const entry_sink& add) {
-            piece_compressor compressor(piece_compressor::form::stream_part, options.compression);
-            running_crc whole;
-            model.for_each_piece(
-                [&](const std::string& text) {
-                    return compressor.compress(std::as_bytes(std::span{text}), text.size());
-                },
-                [&](std::size_t, const std::shared_ptr<const compressed_piece>& piece) {
-                    add(piece->bytes);
-                    whole.add(*piece);
-                    piece_done();
-                });
-            add(deflate_end);
-            return zip_archive::source{whole.size, whole.crc};
-        });
+        archive.add_compressed(
+            name,
+            [&](const entry_sink& add) {
+                piece_compressor compressor(piece_compressor::form::stream_part, options.compression);
+                running_crc whole;
+                model.for_each_piece(
+                    [&](const std::string& text) {
+                        return compressor.compress(std::as_bytes(std::span{text}), text.size());
+                    },
+                    [&](std::size_t, const std::shared_ptr<const compressed_piece>& piece) {
+                        add(piece->bytes);
+                        whole.add(*piece);
+                        piece_done();
+                    });
+                add(deflate_end);
+                return zip_archive::source{whole.size, whole.crc};
+            },
+            model.is_large());
     }
     archive.finish();
 }

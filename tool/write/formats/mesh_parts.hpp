@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What the writers of meshes share: limits of faces a file, coordinates and colours.
+// What the writers of meshes share: files of a bounded number of faces, coordinates and colours.
 
 #include "mesh.hpp"
 #include "progress.hpp"
@@ -48,7 +48,7 @@ inline std::uint64_t most_faces(std::uint64_t of_format, const write_options& op
     return options.faces_per_file != 0 ? std::min(of_format, options.faces_per_file) : of_format;
 }
 
-// The parts of a mesh, each with at most MOST faces.
+// Files of at most `most` faces each.
 [[nodiscard]] std::vector<mesh_part> split(std::span<const voxel_face> faces, const std::filesystem::path& path,
                                            std::uint64_t most);
 

@@ -32,7 +32,7 @@ public:
         number(kind, 1);
         add(name);
     }
-    // A list of COUNT elements, whose content follows.
+    // A list of `count` elements, whose content follows.
     void begin_list(std::string_view name, tag of, std::int64_t count) {
         begin(list, name);
         number(of, 1);

@@ -19,7 +19,7 @@ constexpr unsigned one_byte =
     128; // numbers below it take a byte, those from it on two: seven bits each, low ones first
 
 // All up to the blocks themselves.
-nbt head_of(const block_grid& grid, std::int64_t bytes) {
+nbt schematic_head(const block_grid& grid, std::int64_t bytes) {
     nbt head;
     head.begin(nbt::compound, "Schematic");
     head.named("Version", 2);
@@ -45,7 +45,7 @@ nbt head_of(const block_grid& grid, std::int64_t bytes) {
     return head;
 }
 
-nbt tail() {
+nbt schematic_tail() {
     nbt after;
     after.begin_list("BlockEntities", nbt::compound, 0);
     after.finish();
@@ -88,7 +88,7 @@ std::vector<std::filesystem::path> write_schem(const voxel_shape& v, const std::
     if (*std::max_element(v.extent.begin(), v.extent.end()) > most_side || grid.volume() > most_blocks) refuse();
     const std::int64_t bytes = num_bytes(grid, options.threads);
     if (bytes > most_blocks) refuse();
-    return write_block_file(grid, head_of(grid, bytes), tail(), bytes_of, path, options);
+    return write_block_file(grid, schematic_head(grid, bytes), schematic_tail(), bytes_of, path, options);
 }
 
 } // namespace voxelize

@@ -52,7 +52,7 @@ public:
     }
     // True if there are numbers of materials.
     [[nodiscard]] bool has_materials() const { return materials_ != nullptr; }
-    // The number of the material of an occupied voxel of a brick; -1: the voxel is of no material.
+    // Number of the material of an occupied voxel of a brick; -1: no material.
     [[nodiscard]] std::int32_t material(std::size_t brick, const glm::ivec3& voxel) const {
         std::int32_t number;
         std::memcpy(&number, materials_->data.data() + value_of(brick, voxel) * sizeof(number), sizeof(number));

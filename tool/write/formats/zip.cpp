@@ -82,10 +82,10 @@ void zip_archive::check(int code) {
     throw write_error(state_->out.target(), "the zip library gave error " + std::to_string(code));
 }
 
-void zip_archive::add(const std::string& name, const std::function<void(const entry_sink&)>& stream) {
+void zip_archive::add(const std::string& name, const std::function<void(const entry_sink&)>& stream, bool is_large) {
     const int level = state_->compression;
     check(zipOpenNewFileInZip64(state_->archive, name.c_str(), &state_->info, nullptr, 0, nullptr, 0, nullptr,
-                                level > 0 ? Z_DEFLATED : 0, level, 1));
+                                level > 0 ? Z_DEFLATED : 0, level, is_large ? 1 : 0));
     state_->entry_open = true;
     stream([this](std::span<const std::byte> bytes) {
         check(zipWriteInFileInZip(state_->archive, bytes.data(), static_cast<unsigned>(bytes.size())));
@@ -94,9 +94,10 @@ void zip_archive::add(const std::string& name, const std::function<void(const en
     check(zipCloseFileInZip(state_->archive));
 }
 
-void zip_archive::add_compressed(const std::string& name, const std::function<source(const entry_sink&)>& stream) {
+void zip_archive::add_compressed(const std::string& name, const std::function<source(const entry_sink&)>& stream,
+                                 bool is_large) {
     check(zipOpenNewFileInZip2_64(state_->archive, name.c_str(), &state_->info, nullptr, 0, nullptr, 0, nullptr,
-                                  Z_DEFLATED, state_->compression, 1, 1));
+                                  Z_DEFLATED, state_->compression, 1, is_large ? 1 : 0));
     state_->entry_open = true;
     const source whole = stream([this](std::span<const std::byte> bytes) {
         check(zipWriteInFileInZip(state_->archive, bytes.data(), static_cast<unsigned>(bytes.size())));
