@@ -10,7 +10,6 @@
 
 #include <cpu_ref/backend.hpp>
 
-
 #include <algorithm>
 #include <chrono>
 #include <new>
