@@ -49,7 +49,7 @@ same_version='import sys; print(sys.version_info[:2])'
 if "$system" -c 'import torch' 2>/dev/null && [[ $("$system" -c "$same_version") == "$("$python" -c "$same_version")" ]]; then
     "$system" -m venv --clear --system-site-packages "$folder/venv-torch"
     "$folder/venv-torch/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps "$wheel" pytest iniconfig pluggy packaging
-    "$folder/venv-torch/bin/python" -m pytest -q "$root/python/tests/test_interoperation.py" -k torch
+    "$folder/venv-torch/bin/python" -m pytest -q "$root"/python/tests/test_{interoperation,axes,distance}.py -k torch
 else
     printf 'not run: tests with torch (no torch for this version of Python)\n'
 fi

@@ -133,21 +133,20 @@ void bind_grid(nb::module_& m) {
             nb::sig(zyx_call.signature),
             "The index of voxels into an array of the grid: for voxels (n, 3) with columns x, y, z the columns z, y, "
             "x.\n"
-            "Raises IndexError for a voxel outside of the grid, which numpy would take for one at the other end.\n\n"
-            "    occupied = numpy.zeros(grid.shape, bool)\n"
-            "    occupied[grid.zyx(voxels)] = True")
+            "Raises IndexError for a voxel outside of the grid, which numpy would take for one at the other end.\n"
+            "Example: ``occupied[grid.zyx(voxels)] = True``")
         .def(
             "index", [](const grid& g, const nb::object& ijk) { return convert(index_call, g, ijk); }, nb::arg("ijk"),
             nb::sig(index_call.signature),
             "The place of voxels (n, 3), columns x, y, z, in the memory of an array of the grid: (k * ny + j) * nx + "
             "i,\n"
-            "int64. Raises IndexError for a voxel outside of the grid.\n\n"
-            "    values.reshape(-1)[grid.index(voxels)]")
+            "int64. Raises IndexError for a voxel outside of the grid.\n"
+            "Example: ``values.reshape(-1)[grid.index(voxels)]``")
         .def(
             "to_xyz", [](const grid& g, const nb::object& ijk) { return convert(to_xyz_call, g, ijk); }, nb::arg("ijk"),
             nb::sig(to_xyz_call.signature),
-            "World positions (n, 3) of the centres of voxels (n, 3), columns x, y, z: float64.\n\n"
-            "    points = grid.to_xyz(voxels)")
+            "World positions (n, 3) of the centres of voxels (n, 3), columns x, y, z: float64.\n"
+            "Example: ``points = grid.to_xyz(voxels)``")
         .def(
             "to_ijk", [](const grid& g, const nb::object& xyz) { return convert(to_ijk_call, g, xyz); }, nb::arg("xyz"),
             nb::sig(to_ijk_call.signature),
@@ -155,15 +154,15 @@ void bind_grid(nb::module_& m) {
             "the\n"
             "upper one. A position outside of the grid gives a voxel outside of it. Raises ValueError for one that is "
             "not\n"
-            "finite or more than 2^31 voxels away.\n\n"
-            "    voxels = grid.to_ijk(points)")
+            "finite or more than 2^31 voxels away.\n"
+            "Example: ``voxels = grid.to_ijk(points)``")
         .def(
             "ijk", [](const grid& g, const nb::object& dense) { return convert(ijk_call, g, dense); }, nb::arg("dense"),
             nb::sig(ijk_call.signature),
             "The voxels (n, 3), columns x, y, z, of an array (nz, ny, nx) that are not zero: int32, in the order of "
             "the\n"
-            "array.\n\n"
-            "    voxels = grid.ijk(vp.voxelize(mesh, grid))")
+            "array.\n"
+            "Example: ``voxels = grid.ijk(vp.voxelize(mesh, grid))``")
         .def(
             "_relative_to_origin",
             [](const grid& g) {

@@ -182,8 +182,8 @@ nb::dict counts_of(const voxelize::voxelize_stats& stats, std::uint64_t voxels) 
 
 // The voxels that the surface covers, in Morton order; for each target (values, value of an empty voxel); the counters;
 // the warnings. Colours, materials and alpha are the tool's.
-nb::tuple draw(const model_scene& m, const grid& g, const std::string& rule, const std::vector<std::string>& targets,
-               unsigned threads) {
+nb::tuple draw_scene(const model_scene& m, const grid& g, const std::string& rule,
+                     const std::vector<std::string>& targets, unsigned threads) {
     voxelize::voxelize_request request;
     request.grid = g;
     request.coverage = coverage_named(rule);
@@ -251,7 +251,7 @@ void bind_scene_draw(nb::class_<model_scene>& c) {
         .def_prop_ro("is_more_than_triangles", &is_more_than_triangles)
         .def("fit", &fit_scene, nb::arg("resolution").none(), nb::arg("shape").none(), nb::arg("voxel_size").none(),
              nb::arg("padding"))
-        .def("draw", &draw, nb::arg("grid"), nb::arg("coverage"), nb::arg("targets"), nb::arg("threads"))
+        .def("draw", &draw_scene, nb::arg("grid"), nb::arg("coverage"), nb::arg("targets"), nb::arg("threads"))
         .def_static("target_names", &target_names);
 }
 

@@ -15,9 +15,10 @@ sparse_values<float> first_columns(sparse_values<float>&& drawn, std::size_t col
 }
 
 // Values of columns [first_column, first_column + num_columns), one row for each voxel; 1 to 3 columns.
-nb::tuple bake(const position_array& positions, const triangle_array& triangles, const grid& g, const std::string& rule,
-               const array<const float, 2>& values, std::size_t first_column, std::size_t num_columns,
-               bool per_triangle, const std::string& blend_name, bool with_voxels, unsigned threads) {
+nb::tuple bake_floats(const position_array& positions, const triangle_array& triangles, const grid& g,
+                      const std::string& rule, const array<const float, 2>& values, std::size_t first_column,
+                      std::size_t num_columns, bool per_triangle, const std::string& blend_name, bool with_voxels,
+                      unsigned threads) {
     if (num_columns < 1 || num_columns > 3) throw nb::value_error("a pass takes 1 to 3 columns");
     const auto call = make_bake_call<float>(positions, triangles, g, rule, values, {first_column, num_columns},
                                             per_triangle, threads);
@@ -35,9 +36,9 @@ nb::tuple bake(const position_array& positions, const triangle_array& triangles,
 } // namespace
 
 void bind_sparse_float(nb::module_& m) {
-    m.def("sparse_float", &bake, nb::arg("positions"), nb::arg("triangles"), nb::arg("grid"), nb::arg("coverage"),
-          nb::arg("values"), nb::arg("first_column"), nb::arg("num_columns"), nb::arg("per_triangle"), nb::arg("blend"),
-          nb::arg("with_voxels"), nb::arg("threads"));
+    m.def("sparse_float", &bake_floats, nb::arg("positions"), nb::arg("triangles"), nb::arg("grid"),
+          nb::arg("coverage"), nb::arg("values"), nb::arg("first_column"), nb::arg("num_columns"),
+          nb::arg("per_triangle"), nb::arg("blend"), nb::arg("with_voxels"), nb::arg("threads"));
 }
 
 } // namespace voxelpipe::python

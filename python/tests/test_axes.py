@@ -115,7 +115,8 @@ def test_lists_of_torch_are_signed_and_index():
     mesh = (torch.from_numpy(v), torch.from_numpy(f.astype(np.int64)))
     grid = vp.fit(mesh, 24)
     lists = vp.fragments(mesh, grid)
-    assert [a.dtype for a in lists] == [torch.int32, torch.int64, torch.int32, torch.float32]
+    assert mesh[1][lists.triangles].shape == (len(lists.triangles), 3)
+    assert [a.dtype for a in lists] == [torch.int32, torch.int64, torch.int64, torch.float32]
     assert lists.interpolate(mesh[0], mesh[1]).shape == (len(lists.triangles), 3)
     assert int(torch.bincount(lists.triangles).sum()) == len(lists.triangles) and int(lists.triangles.max()) < len(f)
     ids = torch.arange(len(f), dtype=torch.int32)

@@ -69,7 +69,7 @@ def test_rays_meet_the_first_voxel_of_a_list():
     low, high = np.array(grid.origin), np.array(grid.origin) + size * grid.shape[::-1]
     rng = np.random.default_rng(7)
     origins = low + (rng.random((300, 3)) * 3 - 1) * (high - low)
-    directions = rng.normal(size=(300, 3))
+    directions = low + rng.random((300, 3)) * (high - low) - origins
     hits = tree.first_hits(origins, directions, threads=2)
     # Every box against every ray.
     corner = grid.to_xyz(voxels) - size / 2

@@ -368,9 +368,9 @@ def sparse(
         fill: the value of voxels of a solid that no triangle touches.
 
     Returns:
-        (voxels, attributes). voxels: a VoxelList (n, 3) int32 with columns x, y, z, in Morton order. attributes: for each
-        name n values or (n, columns), as bake() has them in these voxels. Arrays are indexed [z, y, x]:
-        `array[grid.zyx(voxels)]`; dense() makes an array of the list.
+        Voxels and attributes. The voxels are a VoxelList (n, 3) int32 with columns x, y, z, in Morton order. The
+        attributes are, for each name, n values or (n, columns), as bake() has them in these voxels. Arrays are indexed
+        [z, y, x] by `array[grid.zyx(voxels)]`; dense() makes an array of the list.
 
     Example:
         >>> voxels, attributes = vp.sparse(mesh, grid, {"rgb": colors})

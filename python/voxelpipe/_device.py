@@ -34,6 +34,7 @@ class _Torch:
     """Tensors of torch on one device."""
 
     word = np.int32  # of packed bits: torch can do next to nothing with uint32
+    index = np.int64  # of numbers of triangles, by which all versions index
 
     def __init__(self, like: Any) -> None:
         import torch
@@ -87,6 +88,7 @@ class _Cupy:
     """Arrays of CuPy on one device."""
 
     word = np.uint32
+    index = np.int32
 
     def __init__(self, like: Any) -> None:
         import cupy
@@ -345,4 +347,5 @@ def fragments(m: DeviceMesh, grid: Grid, coverage: str) -> tuple[list[Any], dict
         lib.empty((f, 3), np.float32),
     ]
     kept.copy(*(lib.pointer(a) for a in arrays))
+    arrays[2] = lib.convert(arrays[2], lib.index)
     return arrays, counts

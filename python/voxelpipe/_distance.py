@@ -136,7 +136,9 @@ def distance_at(
 
     Args:
         mesh, points: what voxelize() takes, and positions (n, 3).
+        grid: whose lattice positions are snapped to.
         sign, repair, bodies, max_hole_edges: as in distance(); repair is "none" or "close_holes".
+        threads: 0 takes all cores.
         nearest: also returns the number of each point's nearest triangle, int64.
         status: a dict that is filled with the call's counters; bad_points are those that are not finite or too far from the
             grid. They get NaN and -1.

@@ -287,8 +287,8 @@ def tiles(
         mesh, grid, fill, extent, repair, bodies, max_hole_edges, closing, threads, status: as in solid().
 
     Returns:
-        (voxels, cubes). voxels: a VoxelList (n, 3) int32, columns x, y, z. cubes: (m, 4) int32, the first voxel of a cube
-        (x, y, z) and its side, 8, 16, 32 and so on: all of its voxels are inside, and none is in `voxels`.
+        Voxels and cubes. The voxels are a VoxelList (n, 3) int32, columns x, y, z. The cubes are (m, 4) int32, the first
+        voxel of each (x, y, z) and its side, 8, 16, 32 and so on; all of its voxels are inside, and none is in the list.
 
     Example:
         >>> voxels, cubes = vp.tiles(mesh, vp.fit(mesh, 4096))

@@ -160,7 +160,8 @@ class Fragments(NamedTuple):
     offsets: Any
     """(n + 1,) int64"""
     triangles: Any
-    """(m,) int32: numbers of the mesh's triangles (int64 for a mesh of 2^31 or more)"""
+    """(m,) int32: numbers of the mesh's triangles; int64 for torch, not all of which index by int32, and for a mesh of 2^31
+    triangles or more"""
     barycentrics: Any
     """(m, 3) float32: weights of the triangle's vertices at the point of the triangle next to the voxel's centre along
     the triangle's main axis"""
@@ -210,5 +211,6 @@ def fragments(
     positions, where = m.positions(grid)
     voxels, offsets, numbers, weights, counts = _core.fragments(positions, m.triangles, where, coverage, threads)
     take_counts(counts, status)
-    numbers = numbers.view(np.int32) if len(m.triangles) < 2**31 else numbers.astype(np.int64)
+    is_wide = m.to_caller is to_torch or len(m.triangles) >= 2**31
+    numbers = numbers.astype(np.int64) if is_wide else numbers.view(np.int32)
     return Fragments(listed_for(m, voxels), *(m.to_caller(a) for a in (offsets, numbers, weights)))
