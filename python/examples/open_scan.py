@@ -38,6 +38,7 @@ print(caught[0].message)
 
 # snippet: repairs
 size = np.prod(grid.voxel_size)
+outer = {"repair": "exterior", "closing": 4}
 closed = vp.solid(mesh, grid, repair="close_holes", extent="centre")
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -45,7 +46,7 @@ with warnings.catch_warnings():
         "none": leaking.sum() * size,
         "close_holes": closed.sum() * size,
         "vote": vp.solid(mesh, grid, repair="vote").sum() * size,
-        "exterior, closing=4": vp.solid(mesh, grid, repair="exterior", closing=4).sum() * size,
+        "exterior, closing=4": vp.solid(mesh, grid, **outer).sum() * size,
     }
 for name, volume in found.items():
     print(f"{name:20} {volume:.3f}")
