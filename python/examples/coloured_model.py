@@ -6,7 +6,8 @@
 import numpy as np
 import voxelpipe as vp
 
-turn, latitude = np.meshgrid(np.linspace(0, 2 * np.pi, 361), np.linspace(-np.pi / 2, np.pi / 2, 181))
+turns, latitudes = np.linspace(0, 2 * np.pi, 361), np.linspace(-np.pi / 2, np.pi / 2, 181)
+turn, latitude = np.meshgrid(turns, latitudes)
 across = np.cos(latitude)
 direction = np.stack([across * np.cos(turn), np.sin(latitude), across * np.sin(turn)], axis=-1)
 
@@ -29,10 +30,10 @@ mesh = (vertices, triangles)
 
 # snippet: bake
 grid = vp.fit(mesh, 192)
-color = vp.bake(mesh, grid, {"rgb": rgb.reshape(-1, 3)})["rgb"]  # the mean colour of each voxel's triangles
+color = vp.bake(mesh, grid, {"rgb": rgb.reshape(-1, 3)})["rgb"]  # each voxel's mean
 surface = vp.voxelize(mesh, grid)
 vp.save("globe.png", color, grid, occupied=surface)
-vp.save("globe.html", color, grid, occupied=surface)  # a page that turns and cuts it, for any browser
+vp.save("globe.html", color, grid, occupied=surface)  # a page for any browser
 # end snippet
 
 # snippet: sparse

@@ -10,7 +10,8 @@ import voxelpipe as vp
 def box(low, high):
     """A box as a mesh: float32 (8, 3) and (12, 3)."""
     ends = np.stack([low, high])
-    corners = np.array([ends[[i & 1, i >> 1 & 1, i >> 2], [0, 1, 2]] for i in range(8)], np.float32)
+    corners = [ends[[i & 1, i >> 1 & 1, i >> 2], [0, 1, 2]] for i in range(8)]
+    corners = np.array(corners, np.float32)
     sides = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     sides = np.array(sides)
     return corners, np.concatenate([sides[:, [0, 1, 2]], sides[:, [0, 2, 3]]])
@@ -22,7 +23,7 @@ shapes = [box(-rng.uniform(0.2, 1, 3), rng.uniform(0.2, 1, 3)) for _ in range(8)
 
 # snippet: grid
 N = 32
-grid = vp.Grid(origin=(-1, -1, -1), voxel_size=(2 / N,) * 3, shape=(N, N, N))  # the same for all
+grid = vp.Grid(origin=(-1, -1, -1), voxel_size=(2 / N,) * 3, shape=(N, N, N))
 # end snippet
 
 # snippet: dense

@@ -8,10 +8,11 @@ import warnings
 import numpy as np
 import voxelpipe as vp
 
-turns, heights = np.linspace(0, 2 * np.pi, 120, endpoint=False), np.linspace(0.02, np.pi - 0.02, 60)
-angle, height = np.meshgrid(turns, heights)
+turns = np.linspace(0, 2 * np.pi, 120, endpoint=False)
+angle, height = np.meshgrid(turns, np.linspace(0.02, np.pi - 0.02, 60))
 radius = np.sin(height) * (1 + 0.15 * np.cos(3 * angle) * np.sin(height) ** 2)
-points = np.stack([radius * np.cos(angle), 1.4 * np.cos(height), radius * np.sin(angle)], axis=-1)
+x, y, z = radius * np.cos(angle), 1.4 * np.cos(height), radius * np.sin(angle)
+points = np.stack([x, y, z], axis=-1)
 vertices = points.reshape(-1, 3)
 here = np.arange(angle.size).reshape(angle.shape)
 right = np.roll(here, -1, axis=1)
@@ -37,6 +38,7 @@ print(caught[0].message)
 
 # snippet: repairs
 size = np.prod(grid.voxel_size)
+outer = {"repair": "exterior", "closing": 4}
 closed = vp.solid(mesh, grid, repair="close_holes", extent="centre")
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -44,7 +46,7 @@ with warnings.catch_warnings():
         "none": leaking.sum() * size,
         "close_holes": closed.sum() * size,
         "vote": vp.solid(mesh, grid, repair="vote").sum() * size,
-        "exterior, closing=4": vp.solid(mesh, grid, repair="exterior", closing=4).sum() * size,
+        "exterior, closing=4": vp.solid(mesh, grid, **outer).sum() * size,
     }
 for name, volume in found.items():
     print(f"{name:20} {volume:.3f}")

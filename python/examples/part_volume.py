@@ -8,12 +8,11 @@ import voxelpipe as vp
 
 
 def washer(outer=20.0, inner=9.0, height=5.0, sides=720):
-    """A ring with a square section, in millimetres: four circles of vertices, joined by rectangles."""
+    """A ring, in millimetres: four circles of vertices, joined by rectangles."""
     angle = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     section = [(outer, 0), (outer, height), (inner, height), (inner, 0)]
-    vertices = np.concatenate(
-        [np.stack([r * np.cos(angle), 0 * angle + y, r * np.sin(angle)], axis=1) for r, y in section]
-    )
+    x, z = np.cos(angle), np.sin(angle)
+    vertices = np.concatenate([np.stack([r * x, 0 * x + y, r * z], axis=1) for r, y in section])
     here = np.arange(4 * sides).reshape(4, sides)
     up, right = np.roll(here, -1, axis=0), np.roll(here, -1, axis=1)
     across = np.roll(up, -1, axis=1)
