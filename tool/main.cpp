@@ -8,6 +8,7 @@
 #include "run/command_line.hpp"
 #include "run/output_check.hpp"
 #include "run/run_model.hpp"
+#include "write/formats/output_file.hpp"
 
 #include <algorithm>
 #include <chrono>

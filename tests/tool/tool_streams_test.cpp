@@ -7,8 +7,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <csignal>
+#include <map>
+#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 using namespace tool_test;
@@ -135,6 +139,22 @@ TEST(ToolBlocks, AListSaysWhatVoxelsBecome) {
               blocks("glass material Window\n", "--dense").find("line 1: the model has no material \"Window\""));
 }
 
+// A file of another format beside it is what it is alone.
+TEST(ToolBlocks, AListChangesNoOtherOutput) {
+    const scratch_folder folder;
+    const std::string model = put_cube(folder);
+    put(folder / "b.txt", "bricks material Brick\n");
+    for (const std::string extension : {".nvdb", ".npz", ".ply"}) {
+        const outcome alone = run(folder, {model, "-r", "6", "-o", folder / ("alone" + extension)});
+        ASSERT_EQ(0, alone.code) << alone.err;
+        const outcome beside = run(folder, {model, "-r", "6", "--blocks", folder / "b.txt", "-o", folder / "m.schem",
+                                            "-o", folder / ("beside" + extension)});
+        ASSERT_EQ(0, beside.code) << beside.err;
+        EXPECT_TRUE(read_file(folder / ("alone" + extension)) == read_file(folder / ("beside" + extension)))
+            << extension;
+    }
+}
+
 TEST(ToolBlocks, AWrongListIsRefusedWithItsLine) {
     const scratch_folder folder;
     const std::string model = put_cube(folder);
@@ -160,6 +180,29 @@ TEST(ToolBlocks, AWrongListIsRefusedWithItsLine) {
     const outcome own = run(folder, {model, "--blocks", folder / "b.schem", "-o", folder / "b.schem"});
     EXPECT_EQ(1, own.code);
     EXPECT_NE(std::string::npos, own.err.find("is the list of blocks")) << own.err;
+}
+
+// The shared case of two voxels that touch in an edge, where it is there: the edge has two faces of each.
+TEST(ToolMeshes, AnEdgeOfTwoVoxelsHasTwoFacesOfEach) {
+    const fs::path shared = fs::path(VOXELPIPE_GLTF_DIR).parent_path() / "cases" / "formats" / "f21_edge.obj";
+    if (!fs::exists(shared)) GTEST_SKIP() << "no shared cases: VOXELPIPE_GLTF_DIR";
+    const scratch_folder folder;
+    for (const char* const targets : {"occupancy", "color"}) { // both voxels are of one colour
+        const outcome result = run(folder, {shared.string(), "-o", "obj:-", "-s", "1", "--origin", "0,0,0", "--extent",
+                                            "2,2,1", "--solid", "nonzero", "--solid-extent", "centre", "-t", targets});
+        ASSERT_EQ(0, result.code) << result.err;
+        std::map<std::pair<int, int>, int> faces_of; // an edge
+        std::istringstream lines(result.out);
+        for (std::string line; std::getline(lines, line);) {
+            if (!line.starts_with("f ")) continue;
+            std::istringstream words(line.substr(2));
+            std::vector<int> face;
+            for (int vertex = 0; words >> vertex;) face.push_back(vertex);
+            for (std::size_t c = 0; c < face.size(); ++c) ++faces_of[std::minmax(face[c], face[(c + 1) % face.size()])];
+        }
+        EXPECT_EQ(24u, faces_of.size()); // two cubes
+        for (const auto& [edge, faces] : faces_of) EXPECT_EQ(2, faces) << edge.first << ' ' << edge.second;
+    }
 }
 
 } // namespace

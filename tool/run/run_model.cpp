@@ -78,7 +78,20 @@ std::vector<std::filesystem::path> write_output(Volume& voxels, const command_li
             aside.push_back(std::move(voxels.channels.back()));
             voxels.channels.pop_back();
         }
+    // What --blocks asks for is in files of blocks alone.
+    const bool has_own = find_format(output)->has_blocks || std::find(options.implied.begin(), options.implied.end(),
+                                                                      target::material) == options.implied.end();
+    const auto material = std::find_if(voxels.channels.begin(), voxels.channels.end(), [&](const channel& c) {
+        return !has_own && c.name == info_of(target::material).name;
+    });
+    const auto place = material - voxels.channels.begin();
+    std::optional<channel> left_out;
+    if (material != voxels.channels.end()) {
+        left_out = std::move(*material);
+        voxels.channels.erase(material);
+    }
     std::vector<std::filesystem::path> files = write_to(voxels, output, how);
+    if (left_out) voxels.channels.insert(voxels.channels.begin() + place, std::move(*left_out));
     for (; !aside.empty(); aside.pop_back()) voxels.channels.push_back(std::move(aside.back()));
     return files;
 }
