@@ -210,18 +210,19 @@ model_bodies::model_bodies(const scene& model, const voxelize_request& request) 
             parts.textures = model.textures;
             parts.images = model.images;
             parts.primitives = connected_parts(*only);
-            of_draws.clear();
+            std::vector<body> of_parts;
             for (const body_color& color : colors_of(parts, request))
-                of_draws.push_back({color, static_cast<std::int32_t>(only->material)});
-            if (parts.primitives.size() > 1 && of_draws != std::vector(of_draws.size(), of_draws.front())) {
+                of_parts.push_back({color, static_cast<std::int32_t>(only->material)});
+            if (!of_parts.empty() && of_parts != std::vector(of_parts.size(), of_parts.front())) {
+                of_draws = std::move(of_parts);
                 parts_ = std::move(parts.primitives);
                 places_.reserve(parts_.size());
                 mirrored_triangles_.reserve(parts_.size());
                 const affine& to_world = shown.front()->to_world;
                 for (const primitive& p : parts_)
                     add_draw(p, {to_world, reference_point(request.grid)}, to_world.mirrors());
-            } else if (!of_draws.empty()) {
-                of_draws.resize(1);
+            } else if (!of_parts.empty()) { // otherwise no triangle can be drawn
+                of_draws = {of_parts.front()};
             }
         }
     }
