@@ -32,7 +32,7 @@ bool writes_standard_output(const command_line& options) {
 }
 
 void print(const command_line& options, const run_report& report) {
-    // Nor does anything else go there where it is an output.
+    // Where standard output is an output, everything else goes to standard error.
     std::ostream& out = writes_standard_output(options) ? std::cerr : std::cout;
     if (!options.quiet) {
         print_warnings(report.warnings);

@@ -379,7 +379,7 @@ def sparse(
     """
     check_call("sparse", grid, coverage, threads, status)
     if values is not None and _is_own(values):
-        _check_own(blend, per)
+        _check_own(blend, per, fill)
         listed, own, counts = _own(mesh, grid, values, coverage, threads)  # type: ignore[arg-type]
         to_caller = _to_caller(mesh)
         rows = {n: a for n, (a, _) in own.items()}

@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 import re
 import struct
+import warnings
 import zlib
 from typing import Any, Iterable, Mapping
 
@@ -158,8 +159,7 @@ def _write_by_tool(path: str, f: _Format, values: Any, grid: Grid, occupied: Any
         voxels, rows = listed(values, occupied, grid)
         channels = _channels(f, rows, 1)
         _refuse_inputs(path, grid, [n for n, _ in channels])
-        files, _ = _core.write_list(WriteError, path, grid, voxels, channels, *how)
-        return list(files)
+        return _told(*_core.write_list(WriteError, path, grid, voxels, channels, *how))
     arrays = named(values)
     check_shapes(values, arrays, occupied, grid)
     mask = None
@@ -167,7 +167,13 @@ def _write_by_tool(path: str, f: _Format, values: Any, grid: Grid, occupied: Any
         mask = np.ascontiguousarray(occupied_of(arrays, occupied)).view(np.uint8)
     channels = _channels(f, arrays, 3)
     _refuse_inputs(path, grid, [n for n, _ in channels] + ["occupancy"] * (mask is not None))
-    files, _ = _core.write_dense(WriteError, path, grid, mask, channels, *how)
+    return _told(*_core.write_dense(WriteError, path, grid, mask, channels, *how))
+
+
+def _told(files: Iterable[str], texts: Iterable[str]) -> list[str]:
+    """The files of save(), which warns of what readers of their format do not show."""
+    for text in texts:
+        warnings.warn(text, stacklevel=4)
     return list(files)
 
 
@@ -271,20 +277,20 @@ def save(
 
     .npy: one array, as it is. .npz: the arrays by name, with origin and voxel_size. .nvdb (NanoVDB): the occupied voxels
     with their values, a grid for each name. .png: a picture, see render(). .html: a page, see view(). .vti, .pvti, .nrrd and
-    .zarr: all arrays. .vox, .schem, .binvox, .glb, .obj, .ply, .stl, .xyz: the occupied voxels, with the first array of
-    colours where the format has any.
+    .zarr: all arrays. .vox, .schem, .litematic, .binvox, .glb, .obj, .ply, .stl, .3mf, .xyz: the occupied voxels, with the
+    first array of colours where the format has any.
 
     Args:
         path: the file. Formats with one array a file write "a.NAME.nrrd" and so on for several.
         values: an array, a dict of arrays, or what sparse() returned.
         grid: the Grid of the values.
         occupied: bool (nz, ny, nx); by default the voxels whose value is not zero.
-        compression: zlib level of .vti, .nrrd, .zarr and .schem, 0 to 9.
-        merge: .ply, .obj, .glb, .stl: coplanar faces of equal colour become one rectangle.
+        compression: zlib level of .vti, .nrrd, .zarr, .3mf, .schem and .litematic, 0 to 9.
+        merge: .ply, .obj, .glb, .stl, .3mf: coplanar faces of equal colour become one rectangle.
         points: .ply holds the voxels' centres.
         levels: .zarr holds mip levels, too.
         pieces: .pvti, .nvdb: slabs along z.
-        up: the axis that stands upright in .vox, .schem, .png and .html: "y" or "z".
+        up: the axis that stands upright in .vox, .schem, .litematic, .png and .html: "y" or "z".
         threads: 0 takes all cores.
         name: the title of .html.
         size, azimuth, elevation, zoom, background: of .png, as in render().
@@ -295,6 +301,8 @@ def save(
     Raises:
         ValueError: the format is not known, or the values do not fit it.
         OSError: the file cannot be written. WriteError, of the tool's writers, is both.
+
+    Warns where the file is written, but readers of its format do not show all of it.
 
     Example:
         >>> vp.save("lighthouse.vox", vp.bake("lighthouse.glb", grid), grid)

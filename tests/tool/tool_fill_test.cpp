@@ -186,6 +186,14 @@ TEST(Fill, AModelOfOneDrawHasItsConnectedParts) {
     EXPECT_EQ(glm::u8vec4(0, 255, 0, 255), voxels.color_at({9, 5, 5})); // both accept it
     EXPECT_EQ(glm::u8vec4(0, 255, 0, 255), voxels.color_at({15, 5, 5}));
     EXPECT_EQ(0, voxels.material_at({9, 5, 5}));
+    // Counts of one draw are 1, also in tiles that are cut where its parts meet.
+    for (const std::string storage : {"dense", "sparse"}) {
+        const outcome result =
+            run(folder, {folder / "m.ply", "-q", "-r", "64", "--backend", "cpu", "--solid", "each_draw", "-t",
+                         "count,color", "--" + storage, "-o", folder / (storage + ".vti")});
+        EXPECT_EQ(0, result.code) << result.err;
+    }
+    EXPECT_TRUE(read_file(folder / "dense.vti") == read_file(folder / "sparse.vti"));
 }
 
 // The red box lacks its side at -x, so rows along x have nothing of it before they are in it; lids on the holes of each

@@ -140,11 +140,12 @@ body_color material_colors::sum::color() const {
     return made;
 }
 
-std::vector<body_color> colors_of(const scene& model, const voxelize_request& request) {
-    std::vector<body_color> colors(model.primitives.size());
+std::vector<body_color> colors_of(std::span<const primitive> primitives, const scene& model,
+                                  const voxelize_request& request) {
+    std::vector<body_color> colors(primitives.size());
     const material_colors materials(model.materials, model.textures, model.images, request);
-    parallel_for(model.primitives.size(), thread_count(request.threads), [&](std::size_t p) {
-        const primitive& of = model.primitives[p];
+    parallel_for(primitives.size(), thread_count(request.threads), [&](std::size_t p) {
+        const primitive& of = primitives[p];
         material_colors::sum sum(materials, of.material, !of.texcoords.empty());
         if (of.colors.empty() && !sum.varies()) {
             colors[p] = sum.plain();
@@ -166,6 +167,10 @@ std::vector<body_color> colors_of(const scene& model, const voxelize_request& re
         colors[p] = sum.color();
     });
     return colors;
+}
+
+std::vector<body_color> colors_of(const scene& model, const voxelize_request& request) {
+    return colors_of(model.primitives, model, request);
 }
 
 stream_colors colors_of(triangle_stream& model, const voxelize_request& request) {

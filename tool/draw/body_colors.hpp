@@ -63,7 +63,10 @@ private:
     color_tables tables_ = make_color_tables();
 };
 
-// The colour of each primitive of a scene that an instance shows.
+// The colour of each of these primitives, which have the materials, textures and pictures of a scene.
+[[nodiscard]] std::vector<body_color> colors_of(std::span<const primitive> primitives, const scene& model,
+                                                const voxelize_request& request);
+// The colour of each primitive of a scene.
 [[nodiscard]] std::vector<body_color> colors_of(const scene& model, const voxelize_request& request);
 
 // The triangles of a primitive that are connected by the places of their vertices, as primitives of their own, in the

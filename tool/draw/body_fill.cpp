@@ -205,23 +205,20 @@ model_bodies::model_bodies(const scene& model, const voxelize_request& request) 
                 {colors[i->primitive], static_cast<std::int32_t>(model.primitives[i->primitive].material)});
         const primitive* const only = shown.size() == 1 ? &model.primitives[shown.front()->primitive] : nullptr;
         if (only != nullptr && request.wants_colors() && (!only->colors.empty() || !only->texcoords.empty())) {
-            scene parts;
-            parts.materials = model.materials;
-            parts.textures = model.textures;
-            parts.images = model.images;
-            parts.primitives = connected_parts(*only);
-            of_draws.clear();
-            for (const body_color& color : colors_of(parts, request))
-                of_draws.push_back({color, static_cast<std::int32_t>(only->material)});
-            if (parts.primitives.size() > 1 && of_draws != std::vector(of_draws.size(), of_draws.front())) {
-                parts_ = std::move(parts.primitives);
+            std::vector<primitive> parts = connected_parts(*only);
+            std::vector<body> of_parts;
+            for (const body_color& color : colors_of(parts, model, request))
+                of_parts.push_back({color, static_cast<std::int32_t>(only->material)});
+            if (!of_parts.empty() && of_parts != std::vector(of_parts.size(), of_parts.front())) {
+                of_draws = std::move(of_parts);
+                parts_ = std::move(parts);
                 places_.reserve(parts_.size());
                 mirrored_triangles_.reserve(parts_.size());
                 const affine& to_world = shown.front()->to_world;
                 for (const primitive& p : parts_)
                     add_draw(p, {to_world, reference_point(request.grid)}, to_world.mirrors());
-            } else if (!of_draws.empty()) {
-                of_draws.resize(1);
+            } else if (!of_parts.empty()) { // otherwise no triangle can be drawn
+                of_draws = {of_parts.front()};
             }
         }
     }

@@ -64,7 +64,9 @@ bool is_number_of_a_part(const channel& c) {
 }
 
 rgb8 color_of_number(double value) {
-    const std::uint32_t hash = (static_cast<std::uint32_t>(static_cast<std::int64_t>(value)) + 1u) * 0x9e3779b1u;
+    constexpr double most = 9e18; // about the limit of 64 bits, which NaN and some numbers of users do not fit
+    const std::int64_t number = value > -most && value < most ? static_cast<std::int64_t>(value) : -1;
+    const std::uint32_t hash = (static_cast<std::uint32_t>(number) + 1u) * 0x9e3779b1u;
     const double hue = (hash >> 8) / static_cast<double>(0xffffff) * 6, light = 0.62 + 0.25 * ((hash & 255u) / 255.0);
     rgb8 color{};
     for (std::size_t c = 0; c < 3; ++c) {

@@ -351,6 +351,9 @@ private:
         sparse_volume result;
         result.shape = surface_of.shape;
         take_bricks(result, framebuffer);
+        // Counts of several bodies make no tiles, so all counts are 1 where there are tiles, which may be opened or
+        // cut.
+        const bool has_counts = this->counts_bodies() && result.tiles.empty();
         if (!surface_of.keys.empty() && !result.tiles.empty()) result = open_tiles(result, &surface_of.keys);
         if (part.extent != wanted_part.extent)
             keep_part(result, wanted_part.offset, wanted_part.extent);
@@ -375,7 +378,7 @@ private:
                 add_occupancy(result);
             else if (wanted != target::count)
                 add_filled(result, surface_of, info_of(wanted).name, fills[t]);
-            else if (this->counts_bodies())
+            else if (has_counts)
                 copy<1, std::uint32_t>(result, wanted, framebuffer);
             else
                 resolve<std::uint32_t>(result, wanted, [](std::size_t) { return 1U; });

@@ -110,6 +110,8 @@ bool has_only(std::string_view text, std::string_view more) {
 
 // "oak_log[axis=y]" -> "minecraft:oak_log[axis=y]"; nothing where it is no name of a block.
 std::optional<std::string> block_name(std::string_view word) {
+    constexpr std::size_t longest = 32767; // NBT has the length of a text in 16 bits
+    if (word.size() > longest) return std::nullopt;
     const std::size_t bracket = word.find('[');
     const std::string_view name = word.substr(0, bracket);
     const std::size_t colon = name.find(':');
