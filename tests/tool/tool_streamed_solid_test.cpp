@@ -141,10 +141,10 @@ TEST(StreamedSolids, PartsOfGltf) {
     two_ways{folder,
              folder / "m.glb",
              {"-r", "64", "-t", "occupancy,color,material", "--solid", "exterior", "--closing", "3"}}
-        .expect_equal(44);
+        .expect_equal(60);
     // Each body's own holes are closed.
     two_ways{folder, folder / "m.glb", {"-r", "64", "-t", "color,material", "--solid", "nonzero", "--close-holes"}}
-        .expect_equal(44);
+        .expect_equal(60);
     two_ways{folder, folder / "m.glb", {"-r", "64", "-t", "count,triangle", "--solid", "nonzero", "--vote"}}
         .expect_equal(44);
 }
