@@ -16,7 +16,7 @@ namespace voxelize {
 namespace {
 
 // Bits of a block's number.
-unsigned bits_of(const block_list& list) {
+unsigned bits_of_block(const block_list& list) {
     constexpr unsigned least = 2; // of the format
     return std::max(least, static_cast<unsigned>(std::bit_width(list.names.size())));
 }
@@ -73,7 +73,7 @@ nbt litematic_head(const block_grid& grid, std::int64_t occupied) {
         head.begin_list(name, nbt::compound, 0);
     head.begin(nbt::long_array, "BlockStates");
     constexpr std::int64_t long_bits = 64;
-    head.number((grid.volume() * bits_of(grid.list()) + long_bits - 1) / long_bits, 4);
+    head.number((grid.volume() * bits_of_block(grid.list()) + long_bits - 1) / long_bits, 4);
     return head;
 }
 
@@ -84,7 +84,7 @@ nbt litematic_tail() {
 }
 
 // Numbers of `bits` bits each, the first in the lowest bits, as whole 64-bit integers.
-std::vector<std::byte> packed(std::span<const std::uint16_t> numbers, unsigned bits) {
+std::vector<std::byte> packed_longs(std::span<const std::uint16_t> numbers, unsigned bits) {
     constexpr std::size_t long_bits = 64;
     std::vector<std::byte> bytes;
     bytes.reserve((numbers.size() * bits + long_bits - 1) / long_bits * 8);
@@ -112,10 +112,10 @@ std::vector<std::filesystem::path> write_litematic(const voxel_shape& v, const s
     const block_grid grid(v, options);
     if (grid.volume() > std::numeric_limits<std::int32_t>::max())
         throw write_error(path, "too large for .litematic, which ends at 2^31 - 1 blocks; use .npz, .vti or .nrrd");
-    const unsigned bits = bits_of(grid.list());
+    const unsigned bits = bits_of_block(grid.list());
     return write_block_file(
         grid, litematic_head(grid, static_cast<std::int64_t>(v.num_voxels())), litematic_tail(),
-        [bits](std::span<const std::uint16_t> numbers) { return packed(numbers, bits); }, path, options);
+        [bits](std::span<const std::uint16_t> numbers) { return packed_longs(numbers, bits); }, path, options);
 }
 
 } // namespace voxelize

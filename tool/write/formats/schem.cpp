@@ -19,7 +19,7 @@ constexpr unsigned one_byte =
     128; // numbers below it take a byte, those from it on two: seven bits each, low ones first
 
 // All up to the blocks themselves.
-nbt schematic_head(const block_grid& grid, std::int64_t bytes) {
+nbt schem_head(const block_grid& grid, std::int64_t bytes) {
     nbt head;
     head.begin(nbt::compound, "Schematic");
     head.named("Version", 2);
@@ -45,14 +45,14 @@ nbt schematic_head(const block_grid& grid, std::int64_t bytes) {
     return head;
 }
 
-nbt schematic_tail() {
+nbt schem_tail() {
     nbt after;
     after.begin_list("BlockEntities", nbt::compound, 0);
     after.finish();
     return after;
 }
 
-std::vector<std::byte> bytes_of(std::span<const std::uint16_t> numbers) {
+std::vector<std::byte> schem_bytes(std::span<const std::uint16_t> numbers) {
     std::vector<std::byte> bytes;
     bytes.reserve(numbers.size());
     for (const std::uint16_t number : numbers) {
@@ -88,7 +88,7 @@ std::vector<std::filesystem::path> write_schem(const voxel_shape& v, const std::
     if (*std::max_element(v.extent.begin(), v.extent.end()) > most_side || grid.volume() > most_blocks) refuse();
     const std::int64_t bytes = num_bytes(grid, options.threads);
     if (bytes > most_blocks) refuse();
-    return write_block_file(grid, schematic_head(grid, bytes), schematic_tail(), bytes_of, path, options);
+    return write_block_file(grid, schem_head(grid, bytes), schem_tail(), schem_bytes, path, options);
 }
 
 } // namespace voxelize
