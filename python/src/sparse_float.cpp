@@ -5,7 +5,7 @@
 namespace voxelpipe::python {
 namespace {
 
-// Of three columns the first ones.
+// Channels of fewer than three columns take the first ones.
 sparse_values<float> first_columns(sparse_values<float>&& drawn, std::size_t columns) {
     if (columns == 3) return std::move(drawn);
     for (std::size_t i = 0; i < drawn.num_voxels; ++i)

@@ -17,7 +17,7 @@ namespace voxelize {
 
 namespace {
 
-// As sparse_pipeline has its bits: the second target stays off.
+// The framebuffer of a body's voxels, of the type that sparse_pipeline compiles anyway: its second target stays off.
 using body_bits = vp::sparse_framebuffer<vp::cpu_backend, vp::target<vp::bit, vp::blend::bit_or>,
                                          vp::target<std::uint32_t, vp::blend::count>>;
 
@@ -136,7 +136,7 @@ std::optional<std::uint32_t> body_map::of_cube(std::uint64_t first, int level) c
     return value_of(over);
 }
 
-// Appends the tile, or what it is cut into; numbers: of the tiles.
+// Appends the tile, or what it is cut into, and the numbers of the bodies of the tiles that it appends.
 void body_map::cut(voxelpipe::brick_tile tile, const same_values& same, sparse_volume& to,
                    std::vector<std::uint32_t>& numbers) const {
     labels each;

@@ -131,10 +131,10 @@ public:
 
     // The model's draws in host memory, which last as long as this. One of the two is called.
     void take_draws(std::span<const draw> draws);
-    // The same from the scene itself, whose lists last as long as this.
+    // Makes the draws from the scene, whose lists last as long as this.
     void make_draws(const scene& model);
 
-    // In a grid that is relative to the request's reference point.
+    // The bodies in PART, a grid that is relative to the request's reference point.
     [[nodiscard]] body_map find_in(const voxelpipe::grid& part) const;
 
 private:

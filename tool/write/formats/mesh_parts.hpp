@@ -32,7 +32,7 @@ inline std::uint8_t red(std::uint32_t rgb) { return static_cast<std::uint8_t>(rg
 inline std::uint8_t green(std::uint32_t rgb) { return static_cast<std::uint8_t>(rgb >> 8); }
 inline std::uint8_t blue(std::uint32_t rgb) { return static_cast<std::uint8_t>(rgb >> 16); }
 
-// World coordinate of lattice plane `n` + `part` along an axis.
+// World coordinate of the lattice plane N along an axis; N is not whole for the middle of a voxel.
 inline double world(const voxel_shape& v, std::size_t axis, double n) {
     return std::fma(n, v.voxel_size[axis], v.origin[axis]);
 }
