@@ -53,8 +53,9 @@ TEST(ToolStreams, StandardOutputHasTheBytesOfTheFile) {
         EXPECT_NE(std::string::npos, streamed.err.find("backend")) << streamed.err;
         arguments[2] = folder / ("m." + name);
         ASSERT_EQ(0, run(folder, arguments).code) << name;
-        if (name != "html") // whose title is the name of the file
+        if (name != "html") { // whose title is the name of the file
             EXPECT_TRUE(read_file(arguments[2]) == streamed.out) << name;
+        }
         EXPECT_LT(20u, streamed.out.size()) << name;
     }
 }
