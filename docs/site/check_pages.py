@@ -116,7 +116,7 @@ def main():
     if browser is None:
         print("not run: no browser here, so pages were not looked at")
     else:
-        with tempfile.TemporaryDirectory() as profile, Browser(browser, profile, *WIDTHS["screen"]) as tab:
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile, Browser(browser, profile, *WIDTHS["screen"]) as tab:
             for domain in ("Runtime", "Log", "Page"):
                 tab.call(f"{domain}.enable")
             errors += look(tab, html, pictures)

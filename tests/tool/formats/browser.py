@@ -87,7 +87,7 @@ class Browser:
     def visit(self, address):
         """Opens any page, and waits until all that it names is loaded."""
         self.call("Page.navigate", url=address)
-        self.wait_for("document.readyState === 'complete' && location.href !== 'about:blank'")
+        self.wait_for("document.readyState === 'complete' && location.href !== 'about:blank'", 300)
 
     def press(self, key):
         for kind in ("keyDown", "keyUp"):

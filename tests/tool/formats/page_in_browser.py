@@ -284,7 +284,7 @@ def check_beside(browser, template, folder):
 
 def main():
     chromium, folder = sys.argv[1], pathlib.Path(sys.argv[2])
-    with tempfile.TemporaryDirectory() as scratch, Browser(chromium, f"{scratch}/profile", WIDTH, HEIGHT) as browser:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as scratch, Browser(chromium, f"{scratch}/profile", WIDTH, HEIGHT) as browser:
         check_view(browser, folder / "odd.html", -1.2, 0.3, "")
         check_view(browser, folder / "odd.html", 2.4, -0.5, "y:12")
         check_view(browser, folder / "plain.html", 0.2, 0.9, "")
