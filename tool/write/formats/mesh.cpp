@@ -173,10 +173,10 @@ void write_glb_part(output_file& out, const voxel_shape& v, const welded_mesh& m
 
 } // namespace
 
-std::vector<mesh_part> split(std::span<const voxel_face> faces, const std::filesystem::path& path, std::uint64_t most) {
+std::vector<file_part> split(std::span<const voxel_face> faces, const std::filesystem::path& path, std::uint64_t most) {
     if (faces.size() <= most) return {{path, faces}};
     const std::size_t parts = (faces.size() + most - 1) / most;
-    std::vector<mesh_part> result;
+    std::vector<file_part> result;
     for (std::size_t n = 0; n < parts; ++n) {
         const std::size_t begin = faces.size() * n / parts, end = faces.size() * (n + 1) / parts;
         result.push_back({with_word(path, std::to_string(n + 1)), faces.subspan(begin, end - begin)});

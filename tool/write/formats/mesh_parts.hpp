@@ -38,7 +38,7 @@ inline double world(const voxel_shape& v, std::size_t axis, double n) {
 }
 
 // A file of a mesh, and the faces that it holds.
-struct mesh_part {
+struct file_part {
     std::filesystem::path path;
     std::span<const voxel_face> faces;
 };
@@ -49,7 +49,7 @@ inline std::uint64_t most_faces(std::uint64_t of_format, const write_options& op
 }
 
 // Files of at most `most` faces each.
-[[nodiscard]] std::vector<mesh_part> split(std::span<const voxel_face> faces, const std::filesystem::path& path,
+[[nodiscard]] std::vector<file_part> split(std::span<const voxel_face> faces, const std::filesystem::path& path,
                                            std::uint64_t most);
 
 // Progress of finding the faces and of writing them, half of it each.
@@ -71,10 +71,10 @@ std::vector<std::filesystem::path> write_parts(std::unique_ptr<output_file> prob
                                                const std::filesystem::path& path, const write_options& options,
                                                std::uint64_t most, const std::function<void(double)>& progress,
                                                const Write& write) {
-    const std::vector<mesh_part> parts = split(faces, path, most_faces(most, options));
+    const std::vector<file_part> parts = split(faces, path, most_faces(most, options));
     progress_meter meter(progress, 2 * static_cast<std::uint64_t>(faces.size())); // about one vertex a face
     std::vector<std::unique_ptr<output_file>> files;
-    for (const mesh_part& part : parts) {
+    for (const file_part& part : parts) {
         if (parts.size() == 1)
             files.push_back(std::move(probe));
         else
