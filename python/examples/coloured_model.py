@@ -38,8 +38,7 @@ vp.save("globe.html", color, grid, occupied=surface)  # a page for any browser
 
 # snippet: sparse
 voxels, values = vp.sparse(mesh, grid, {"rgb": rgb.reshape(-1, 3)})
-x, y, z = voxels.T  # lists have columns x, y, z
-assert np.array_equal(color[z, y, x], values["rgb"])
+assert np.array_equal(color[grid.zyx(voxels)], values["rgb"])  # lists have columns x, y, z
 listed = voxels.nbytes + values["rgb"].nbytes
 print(f"{len(voxels)} voxels in {listed} bytes, dense {color.nbytes}")
 # end snippet
