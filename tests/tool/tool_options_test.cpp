@@ -41,6 +41,7 @@ std::set<std::string> all_options() {
             "--closing R",
             "--distance",
             "--band N|whole",
+            "--blocks FILE",
             "--unsigned",
             "--corners",
             "--iso D",

@@ -51,7 +51,7 @@ TEST(ToolStreams, StandardOutputHasTheBytesOfTheFile) {
         ASSERT_EQ(0, streamed.code) << name << streamed.err;
         EXPECT_NE(std::string::npos, streamed.err.find("wrote " + name + ":-")) << streamed.err;
         EXPECT_NE(std::string::npos, streamed.err.find("backend")) << streamed.err;
-        arguments[2] = folder / ("m." + name);
+        arguments[2] = folder / ("written." + name);
         ASSERT_EQ(0, run(folder, arguments).code) << name;
         if (name != "html") { // whose title is the name of the file
             EXPECT_TRUE(read_file(arguments[2]) == streamed.out) << name;
@@ -63,17 +63,17 @@ TEST(ToolStreams, StandardOutputHasTheBytesOfTheFile) {
 TEST(ToolStreams, AreRefusedWhereTheyCannotBe) {
     const scratch_folder folder;
     const std::string model = put_cube(folder);
-    const auto refused = [&](std::vector<std::string> arguments, const std::string& message) {
+    const auto refused = [&](std::vector<std::string> arguments, const std::string& message, int code = 1) {
         arguments.insert(arguments.begin(), {model, "-r", "6"});
         const outcome result = run(folder, arguments);
-        EXPECT_EQ(1, result.code) << result.err;
+        EXPECT_EQ(code, result.code) << result.err;
         EXPECT_EQ("", result.out);
         EXPECT_NE(std::string::npos, result.err.find(message)) << result.err << "does not have\n" << message;
     };
     refused({"-o", "-"}, "as in -o npy:-");
     refused({"-o", "npy:-", "-o", "ply:-"}, "standard output takes one output");
-    refused({"-o", "npy:-", "-t", "color,normal"}, "holds one file");
-    refused({"-o", "npy:-", "-t", "color", "--sparse"}, "holds one file");
+    refused({"-o", "npy:-", "-t", "color,normal"}, "holds one file", 4);
+    refused({"-o", "npy:-", "-t", "color", "--sparse"}, "holds one file", 4);
     refused({"-o", "tiff:-"}, "must be one of");
 }
 
@@ -134,7 +134,7 @@ TEST(ToolBlocks, AListSaysWhatVoxelsBecome) {
     (void)blocks("# blocks\nbricks material Brick\n minecraft:stone  #808080\n", "--sparse");
     EXPECT_TRUE(dense == read_file(folder / "m.schem"));
     EXPECT_TRUE(dense_lite == read_file(folder / "m.litematic"));
-    EXPECT_EQ("", blocks("bricks #e0d0d0\nbricks #e07b5a\nstone 0,0,0\n", "--dense"));
+    EXPECT_EQ("", blocks("granite #e0d0d0\ngranite #e07b5a\nstone 0,0,0\n", "--dense"));
     EXPECT_FALSE(dense == read_file(folder / "m.schem"));
     EXPECT_NE(std::string::npos,
               blocks("glass material Window\n", "--dense").find("line 1: the model has no material \"Window\""));
