@@ -174,7 +174,20 @@ def icosphere():
     return head_line("xeon", "published.csv") + " Milliseconds.\n\n" + table(["N"] + ours + others, body)
 
 
-TABLES = {"times": times, "means": means, "speed": speed, "icosphere": icosphere, "solids": solids, "solid_rules": solid_rules}
+def peers():
+    """The newest record of bench/python/compare.py: surfaces and solids at one resolution, by program."""
+    cells = {(r["program"], r["resolution"]): r for r in read(ROOT / "xeon" / "python.csv")}
+    columns = [("voxelpipe voxelize", "surface: VoxelPipe"), ("Open3D VoxelGrid", "Open3D"), ("trimesh voxelized", "trimesh"),
+               ("voxelpipe solid", "solid: VoxelPipe"), ("Open3D compute_occupancy", "Open3D"), ("trimesh voxelized().fill()", "trimesh"),
+               ("PyVista voxelize_binary_mask", "PyVista")]
+    columns = [c for c in columns if any(program == c[0] for program, _ in cells)]
+    sizes = sorted({int(n) for _, n in cells})
+    body = [[str(n)] + [short(cells[p, str(n)]["ms"]) if (p, str(n)) in cells else "-" for p, _ in columns] for n in sizes]
+    return head_line("xeon", "python.csv") + " Milliseconds.\n\n" + table(["N"] + [name for _, name in columns], body)
+
+
+TABLES = {"peers": peers,
+          "times": times, "means": means, "speed": speed, "icosphere": icosphere, "solids": solids, "solid_rules": solid_rules}
 
 
 def main():

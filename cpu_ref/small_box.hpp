@@ -11,6 +11,7 @@
 #include <voxelpipe/core/triangle_setup.hpp>
 
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 
 namespace voxelpipe::core {
@@ -24,7 +25,7 @@ namespace voxelpipe::core {
 // to the bounding box; `negative` is -1 if the projection's area is negative, else 0.
 template <int Size, class Lanes>
 VOXELPIPE_INLINE void small_projection(const std::int32_t (&x)[3], const std::int32_t (&y)[3], std::int32_t negative,
-                                       int fraction, std::uint32_t (&rows)[Size]) {
+                                       int fraction, std::uint32_t (&rows)[std::size_t{Size}]) {
     Lanes f[3], step[3], block[3];
     for (int i = 0; i < 3; ++i) {
         const int j = i == 2 ? 0 : i + 1;
@@ -66,7 +67,7 @@ VOXELPIPE_INLINE bool for_each_small_row(const snapped_position& a, const snappe
     if ((nx == 0) | (ny == 0) | (nz == 0)) return false;
 
     const auto sign = [](std::int64_t n) VOXELPIPE_INLINE_LAMBDA { return static_cast<std::int32_t>(n >> 63); };
-    std::uint32_t xy[Size], xz[Size], yz[Size];
+    std::uint32_t xy[std::size_t{Size}], xz[std::size_t{Size}], yz[std::size_t{Size}];
     small_projection<Size, Lanes>(x, y, sign(nz), fraction, xy);
     small_projection<Size, Lanes>(x, z, ~sign(ny), fraction, xz); // (x, z) is left-handed
     small_projection<Size, Lanes>(y, z, sign(nx), fraction, yz);

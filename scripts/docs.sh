@@ -3,9 +3,10 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # Makes the site in build/docs/html, from the documents, the headers by Doxygen, and the docstrings of the Python package. A warning is an
-# error, and so is a public name without documentation.
+# error, and so is a public name without documentation. Takes a minute on two quiet cores.
 #
-#   scripts/docs.sh [--check] [--repository URL]      --check: opens it in a browser without a window and looks whether pages are drawn.
+#   scripts/docs.sh [--check] [--repository URL]      --check: opens every page in a browser without a window, as wide as a screen and as a
+#                                                     telephone, and fails on an error in its console or a page that is not drawn.
 #                                                     --repository: links to sources lead there
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
@@ -34,7 +35,8 @@ say "reading the headers"
 
 say "writing the pages"
 "$python" docs/site/prepare.py "$folder/source" --xml "$folder/doxygen/xml" "${repository[@]}"
-VOXELPIPE_VERSION=$version VOXELPIPE_DOXYGEN_XML=$folder/doxygen/xml VOXELPIPE_PYTHON_SOURCE=$root/python PYTHONDONTWRITEBYTECODE=1 \
+VOXELPIPE_VERSION=$version VOXELPIPE_DOXYGEN_XML=$folder/doxygen/xml VOXELPIPE_PYTHON_SOURCE=$root/python \
+    VOXELPIPE_SITE=$root/docs/site PYTHONDONTWRITEBYTECODE=1 \
     "$python" -m sphinx -q -W --keep-going -j auto -b html "$folder/source" "$folder/html"
 printf '%s: %s pages\n' "$folder/html/index.html" "$(find "$folder/html" -name '*.html' | wc -l)"
 

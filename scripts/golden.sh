@@ -100,9 +100,9 @@ program=$(find_program "${program:-$build/tests/golden/golden_hashes$suffix}")
 
 # The tool's cases: name, model, output, options.
 tool_cases() {
-    local format coverage target solid
+    local format coverage target solid fill
     # Every format, of colours where it shows them; and of several values where it holds them.
-    for format in npy npz vox schem binvox vti nrrd zarr glb obj ply stl xyz html nvdb; do
+    for format in npy npz vox schem litematic binvox vti nrrd zarr glb obj ply stl 3mf xyz html nvdb; do
         printf 'file.%s model.glb out.%s -r 40\n' "$format" "$format"
     done
     for format in npy npz vti nrrd zarr html nvdb; do
@@ -114,7 +114,7 @@ tool_cases() {
     printf 'file.npz.sparse model.glb out.npz -r 40 --sparse -t color,triangle\n'
     printf 'file.npy.sparse model.glb out.npy -r 40 --sparse\n'
     printf 'file.ply.points model.glb out.ply -r 40 --points\n'
-    for format in glb obj ply stl; do printf 'file.%s.merge model.glb out.%s -r 40 --merge\n' "$format" "$format"; done
+    for format in glb obj ply stl 3mf; do printf 'file.%s.merge model.glb out.%s -r 40 --merge\n' "$format" "$format"; done
     # Without an angle, so that the picture takes no sine, which differs between machines.
     printf 'file.png model.glb out.png -r 24 --image-size 96x72 --azimuth 0 --elevation 0 --fov 0\n'
     for target in occupancy count color color-max color-replace color-outer normal material triangle depth; do
@@ -125,6 +125,9 @@ tool_cases() {
     done
     for solid in nonzero even_odd positive each_draw exterior; do
         printf 'solid.tool.%s model.glb out.npz -r 36 --solid %s -t occupancy,color,count\n' "$solid" "$solid"
+    done
+    for fill in body mean nearest; do
+        printf 'solid.tool.fill_%s model.glb out.npz -r 28 --solid nonzero --fill %s -t color,material\n' "$fill" "$fill"
     done
     printf 'solid.tool.inner model.glb out.npy -r 36 --solid nonzero --solid-extent inner\n'
     printf 'solid.tool.close_holes open.stl out.npy -r 36 --solid even_odd --close-holes\n'

@@ -7,9 +7,10 @@
 #
 #   scripts/python_package.sh [OPTION...]      further options of `pip wheel`, such as
 #                                              --config-settings=cmake.define.VOXELPIPE_PYTHON_OPTIONS=-O1
+# The stage `python` of .ci/run optimises nothing, which is a third of the time to compile.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
-need_packages g++ cmake ninja-build libglm-dev python3 python3-venv python3-dev
+need_packages "${build_packages[@]}" python3 python3-venv python3-dev
 folder=$root/build/python
 python=$folder/venv/bin/python
 mkdir -p "$folder"
@@ -39,6 +40,8 @@ tag=$("$python" -c 'import sys; v = sys.version_info; print(f"cp3{v.minor}-cp3{v
 
 say "testing it"
 cd "$folder" # away from the folder that holds headers of the package's name
+# What is baked of models is compared with the tool, where stage test has built that.
+[[ ! -x $root/build/test/tool/voxelize ]] || export VOXELPIPE_TOOL=$root/build/test/tool/voxelize
 "$python" -m pytest -q "$root/python/tests"
 # Tensors, where the distribution's Python has torch (Debian's python3-torch is a download of 47 MB; wheels of PyPI bring CUDA).
 system=/usr/bin/python3
@@ -46,7 +49,7 @@ same_version='import sys; print(sys.version_info[:2])'
 if "$system" -c 'import torch' 2>/dev/null && [[ $("$system" -c "$same_version") == "$("$python" -c "$same_version")" ]]; then
     "$system" -m venv --clear --system-site-packages "$folder/venv-torch"
     "$folder/venv-torch/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps "$wheel" pytest iniconfig pluggy packaging
-    "$folder/venv-torch/bin/python" -m pytest -q "$root/python/tests/test_interoperation.py" -k torch
+    "$folder/venv-torch/bin/python" -m pytest -q "$root"/python/tests/test_{interoperation,axes,distance}.py -k torch
 else
     printf 'not run: tests with torch (no torch for this version of Python)\n'
 fi

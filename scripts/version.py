@@ -17,6 +17,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # File, and the pattern whose every match has the version (or "v" and it) as its group.
 STATED = [
     ("CITATION.cff", r"^version: (\S+)$"),
+    ("docs/badges.svg", r">version</text><text[^>]*>([^<]+)<"),
     ("packaging/vcpkg/voxelpipe/vcpkg.json", r'"version": "([^"]+)"'),
     ("packaging/conan/conandata.yml", r'^  "([^"]+)":'),
     ("packaging/conan/conandata.yml", r"voxelpipe-(\d[\w.]*)\.tar\.gz"),

@@ -8,7 +8,9 @@
 #include "run/command_line.hpp"
 #include "run/output_check.hpp"
 #include "run/run_model.hpp"
+#include "write/formats/output_file.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <iostream>
@@ -25,11 +27,17 @@ void print_warnings(const std::vector<std::string>& warnings) {
     for (const std::string& warning : warnings) std::cerr << "voxelize: warning: " << warning << '\n';
 }
 
+bool writes_standard_output(const command_line& options) {
+    return std::any_of(options.outputs.begin(), options.outputs.end(), is_standard_output);
+}
+
 void print(const command_line& options, const run_report& report) {
+    // Where standard output is an output, everything else goes to standard error.
+    std::ostream& out = writes_standard_output(options) ? std::cerr : std::cout;
     if (!options.quiet) {
         print_warnings(report.warnings);
         // Standard output belongs to the object where one is asked for.
-        std::ostream& stream = options.stats == stats_format::json ? std::cerr : std::cout;
+        std::ostream& stream = options.stats == stats_format::json ? std::cerr : out;
         const glm::ivec3 extent = report.request.grid.extent;
         for (const std::filesystem::path& file : report.files) stream << "wrote " << file.string() << '\n';
         if (!report.files.empty())
@@ -39,8 +47,8 @@ void print(const command_line& options, const run_report& report) {
             stream << "they lie in " << report.bricks << " bricks of 8 x 8 x 8, "
                    << memory::mebibytes(static_cast<double>(report.brick_bytes)) << " with their values\n";
     }
-    if (options.stats == stats_format::text) print_text(std::cout, report);
-    if (options.stats == stats_format::json) print_json(std::cout, report);
+    if (options.stats == stats_format::text) print_text(out, report);
+    if (options.stats == stats_format::json) print_json(out, report);
 }
 
 int run_main(int argc, char** argv) {
@@ -65,6 +73,8 @@ int run_main(int argc, char** argv) {
             return fail(exit_output, error.what());
         }
     }
+    // A reader that goes away is a failed write, and not the end of this process.
+    if (writes_standard_output(options)) std::signal(SIGPIPE, SIG_IGN);
     memory::set_limit(options.max_memory, options.max_memory != 0);
     const run_outcome result = run_model(options, begin);
     if (result.code == exit_ok) {

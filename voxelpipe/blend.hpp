@@ -16,6 +16,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <type_traits>
@@ -260,7 +261,7 @@ requires(blend_traits<Blend, S>::available && !user_blend<Blend, glm::vec<N, S, 
     static constexpr bool available = true;
     static constexpr bool order_free = element::order_free;
     struct sums {
-        typename element::accumulator c[N];
+        typename element::accumulator c[std::size_t{N}];
     };
     static constexpr bool in_place = std::is_same_v<typename element::accumulator, S>;
     using accumulator = std::conditional_t<in_place, vector, sums>;

@@ -11,6 +11,7 @@
 #include <glm/vec3.hpp>
 
 #include <algorithm>
+#include <concepts>
 #include <cstddef>
 #include <type_traits>
 #include <vector>
@@ -128,8 +129,12 @@ template <class T>
 [[nodiscard]] bool is_same_value(const T& a, const T& b) {
     if constexpr (is_scalar<T> || vector_traits<T>::components > 1 || std::is_same_v<T, bool>)
         return has_same_bits(a, b);
-    else
-        return a == b;
+    else {
+        static_assert(std::equality_comparable<T>,
+                      "for_each_occupied compares a target's values with the empty one: a struct needs an operator==");
+        if constexpr (std::equality_comparable<T>) return a == b;
+        return false;
+    }
 }
 
 } // namespace core

@@ -8,7 +8,8 @@
 The mesh is a sphere of 524,288 triangles. Each cell is the median of at least three calls, or of one that takes longer than --seconds;
 an entry that would take more than --most seconds at the next resolution is left out there. A peer that is not installed is left out.
 --processor-time measures that, of all cores together, for machines that do other work meanwhile; it hides what threads gain.
-Surfaces are compared with the voxels that the closed triangles touch, solids with those whose centre is inside; both exact.
+Surfaces are compared with the voxels that the closed triangles touch, solids with those whose centre is inside; both exact. Of solids the
+error of the volume is that against the mesh's own, in percent.
 """
 import argparse
 import csv
@@ -64,6 +65,27 @@ def trimesh_surface(mesh, grid):
     return lambda: model.voxelized(pitch), lambda r: np.rint(r.points / pitch).astype(int)
 
 
+def trimesh_solid(mesh, grid):
+    call, voxels_of = trimesh_surface(mesh, grid)
+    return lambda: call().fill(), voxels_of
+
+
+def open3d_solid(mesh, grid):
+    import open3d as o3d
+
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(o3d.core.Tensor(mesh[0].astype(np.float32)), o3d.core.Tensor(mesh[1].astype(np.uint32)))
+    axes = [np.asarray(grid.origin)[a] + (np.arange(grid.shape[2 - a]) + 0.5) * grid.voxel_size[a] for a in range(3)]
+    z, y, x = np.meshgrid(axes[2], axes[1], axes[0], indexing="ij")
+    centres = o3d.core.Tensor(np.stack([x, y, z], axis=-1).astype(np.float32))
+    return lambda: scene.compute_occupancy(centres), lambda r: np.argwhere(r.numpy() > 0)[:, ::-1]
+
+
+def mesh_volume(mesh):
+    a, b, c = (mesh[0].astype(np.float64)[mesh[1][:, i]] for i in range(3))
+    return abs(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+
+
 def open3d_surface(mesh, grid):
     import open3d as o3d
 
@@ -90,6 +112,8 @@ def pyvista_solid(mesh, grid):
 PEERS = [  # name, package, what is compared, function
     ("trimesh voxelized", "trimesh", "surface", trimesh_surface),
     ("Open3D VoxelGrid", "open3d", "surface", open3d_surface),
+    ("trimesh voxelized().fill()", "trimesh", "solid", trimesh_solid),
+    ("Open3D compute_occupancy", "open3d", "solid", open3d_solid),
     ("PyVista voxelize_binary_mask", "pyvista", "solid", pyvista_solid),
 ]
 
@@ -159,9 +183,13 @@ def main():
     rows, too_slow = [], set()
     cpp = None if args.without_cpp else CppCall(mesh)
 
-    def add(program, n, ms, voxels, missing, extra):
-        rows.append({"program": program, "resolution": n, "ms": round(ms, 3), "voxels": voxels, "missing": missing, "extra": extra})
-        print(f"{program:32} {n:5} {ms:12.2f} ms {voxels:12} voxels, {missing} missing, {extra} too many", flush=True)
+    volume = mesh_volume(mesh)
+
+    def add(program, n, ms, voxels, missing, extra, what):
+        error = f"{100 * (voxels * np.prod(grid.voxel_size) / volume - 1):+.3f}" if what == "solid" else ""
+        rows.append({"program": program, "resolution": n, "ms": round(ms, 3), "voxels": voxels, "missing": missing, "extra": extra,
+                     "volume_error": error})  # fmt: skip
+        print(f"{program:32} {n:5} {ms:12.2f} ms {voxels:12} voxels, {missing} missing, {extra} too many {error}", flush=True)
 
     for n in args.resolutions:
         grid = vp.fit(mesh, n)
@@ -169,18 +197,18 @@ def main():
         for program, what, call in (("voxelpipe voxelize", "surface", lambda: vp.voxelize(mesh, grid)),
                                     ("voxelpipe solid", "solid", lambda: vp.solid(mesh, grid, extent="centre"))):
             ms, exact[what] = timed(call, args.seconds)
-            add(program, n, ms, int(exact[what].sum()), 0, 0)
+            add(program, n, ms, int(exact[what].sum()), 0, 0, what)
         if cpp:
             ms, voxels = cpp.milliseconds(n, 15)
             assert voxels == exact["surface"].sum()
-            add("the same call from C++", n, ms, voxels, 0, 0)
+            add("the same call from C++", n, ms, voxels, 0, 0, "surface")
         for program, package, what, prepare in PEERS:
             if version(package) is None or program in too_slow:
                 continue
             call, voxels_of = prepare(mesh, grid)
             ms, result = timed(call, args.seconds)
             voxels = voxels_of(result)
-            add(program, n, ms, len(voxels), *errors(voxels, exact[what]))
+            add(program, n, ms, len(voxels), *errors(voxels, exact[what]), what)
             if ms > 1000 * args.most / 8:
                 too_slow.add(program)
     if args.out:

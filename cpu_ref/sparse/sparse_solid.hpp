@@ -198,9 +198,9 @@ public:
             touched_[i] = 0;
             counts.voxels += static_cast<unsigned>(std::popcount(word));
             // A bit where a run begins or ends.
-            for (std::uint32_t ends = word ^ (word << 1 | (is_in ? 1u : 0u)); ends != 0; ends &= ends - 1)
+            for (std::uint32_t changes = word ^ (word << 1 | (is_in ? 1u : 0u)); changes != 0; changes &= changes - 1)
                 bounds.push_back(begin + static_cast<std::uint32_t>(i) * 32 +
-                                 static_cast<std::uint32_t>(std::countr_zero(ends)));
+                                 static_cast<std::uint32_t>(std::countr_zero(changes)));
             is_in = (word >> 31) != 0;
         }
         if (is_in) bounds.push_back(begin + static_cast<std::uint32_t>(last_ + 1) * 32);

@@ -1,7 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
 """The pages of the API. Each header is a group of Doxygen's (doxygen_filter.py), which a page shows whole."""
+import pathlib
 import re
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts"))
+from check_documents import sample
 
 # Page: title, words, headers in the order in which a reader meets them.
 CPP = {
@@ -41,10 +46,39 @@ CPP = {
     "arithmetic": ("Arithmetic for shaders", "Operations with the same bits on every compiler and device, and views of arrays.",
                    ["core/exact.hpp", "core/pack.hpp"]),
 }
+# What one wants to do, where its shortest code is (a snippet of a sample that is built and run), and where to read on.
+TASKS = [
+    ("A surface as voxels", "samples/00_shortest.cpp", "shortest", "calls"),
+    ("A grid around a mesh", "samples/guide/grids_and_results.cpp", "grids", "grids"),
+    ("A part of a grid", "samples/guide/memory_and_crops.cpp", "crops", "grids"),
+    ("Results on the host", "samples/guide/grids_and_results.cpp", "read back", "framebuffers"),
+    ("Attributes of vertices", "samples/guide/attributes.cpp", "attributes", "shaders"),
+    ("A vertex shader", "samples/guide/attributes.cpp", "vertex shader", "shaders"),
+    ("A texture", "samples/guide/attributes.cpp", "texture", "shaders"),
+    ("A blend of one's own", "samples/guide/blends.cpp", "order-free", "framebuffers"),
+    ("Several meshes in one call", "samples/guide/blends.cpp", "draws", "calls"),
+    ("Every fragment of a voxel", "samples/guide/grids_and_results.cpp", "find", "abuffers"),
+    ("The inside of meshes", "samples/guide/solids.cpp", "bodies", "solids"),
+    ("A mesh with holes", "samples/guide/solids.cpp", "holes", "solids"),
+    ("Distances from a mesh", "samples/17_clearance.cpp", "fields", "distances"),
+    ("Instances", "samples/09_forest.cpp", "instances", "meshes"),
+    ("Points", "samples/08_points.cpp", "points", "meshes"),
+    ("Tessellation", "samples/05_displaced.cpp", "tessellation", "programs"),
+    ("Geometry programs", "samples/06_hair.cpp", "geometry", "programs"),
+    ("A sparse grid", "samples/04_sparse.cpp", "draw", "sparse"),
+    ("An octree and a ray", "samples/04_sparse.cpp", "octree", "sparse"),
+    ("A NanoVDB file", "samples/04_sparse.cpp", "file", "sparse"),
+    ("Memory of one's own", "samples/guide/memory_and_crops.cpp", "own memory", "framebuffers"),
+    ("A mesh larger than memory", "samples/guide/solids.cpp", "stream", "slabs"),
+    ("Errors", "samples/guide/memory_and_crops.cpp", "errors", "calls"),
+    ("A CUDA stream", "samples/guide/on_a_gpu.cu", "stream", "backends"),
+    ("Frames that never wait", "samples/guide/on_a_gpu.cu", "tracked", "streams"),
+]
 # Shown nowhere: what the library uses to write NanoVDB files.
 HIDDEN = ["sparse/io/nanovdb_nodes.hpp"]
-PYTHON = ["Grid", "fit", "voxelize", "solid", "bake", "sparse", "fragments", "Fragments", "save", "render", "view", "View",
-          "DroppedTrianglesWarning", "OpenMeshWarning"]
+PYTHON = ["Grid", "fit", "load_model", "Model", "Material", "Texture", "Part", "voxelize", "solid", "tiles", "distance", "distance_at",
+          "bake", "sparse", "dense", "VoxelList", "lines", "points", "instances", "Octree", "Hits", "fragments", "Fragments", "save", "formats", "render", "view", "View",
+          "DroppedTrianglesWarning", "OpenMeshWarning", "ModelWarning", "WriteError"]
 
 
 def heading(text, line="="):
@@ -74,6 +108,16 @@ def group_of(header):
     return re.sub("[^a-z0-9_]", "_", header)
 
 
+def write_tasks(file):
+    """Calls by task, each with an example."""
+    text = heading("C++ calls by task") + ("The shortest code for each, cut from samples that are built and run. ``vp`` is namespace "
+                                           "``voxelpipe``.\n\n.. contents::\n   :local:\n\n")
+    for title, path, snippet, page in TASKS:
+        code = "".join("   " + line if line.strip() else line for line in sample(path, snippet).splitlines(keepends=True))
+        text += heading(title, "-") + f".. code-block:: cpp\n\n{code}\n:doc:`{CPP[page][0]} <{page}>`, from ``{path}``.\n\n"
+    file.write_text(text, encoding="utf-8")
+
+
 def unlisted(xml):
     """Headers with public names that CPP does not list: no name is missing on the site."""
     listed = {group_of(h) for _, _, headers in CPP.values() for h in headers} | {group_of(h) for h in HIDDEN}
@@ -94,7 +138,7 @@ def write_api(out, xml, python_source):
     (folder / "index.rst").write_text(
         heading("C++ API") + "Everything is in namespace ``voxelpipe``, which programs shorten to ``vp``. ``<cpu_ref/backend.hpp>`` brings the CPU "
         "backend, ``<voxelpipe/voxelpipe.hpp>`` the rest, with ``cuda_backend`` where nvcc compiles. Namespace ``voxelpipe::core`` is the "
-        "library's own.\n\n.. toctree::\n   :maxdepth: 2\n\n" + toc, encoding="utf-8")
+        "library's own. :doc:`tasks` has the calls by what they are for.\n\n.. toctree::\n   :maxdepth: 2\n\n" + toc, encoding="utf-8")
     for name, (title, words, headers) in CPP.items():
         text = heading(title) + words + "\n\n"
         for header in headers:
@@ -102,6 +146,7 @@ def write_api(out, xml, python_source):
             text += heading(f"<{shown}>", "-")
             text += f".. doxygengroup:: {group_of(header)}\n   :content-only:\n   :members:\n\n"
         (folder / f"{name}.rst").write_text(text, encoding="utf-8")
+    write_tasks(folder / "tasks.rst")
     text = heading("Python API") + ".. py:module:: voxelpipe\n\n.. py:currentmodule:: voxelpipe\n\n"
     for name in PYTHON:
         if name == "Grid":

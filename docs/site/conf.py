@@ -2,22 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sphinx's configuration; scripts/docs.sh makes the folder that it stands in (docs/site/prepare.py)."""
 import os
+import pathlib
 import re
 import sys
+
+sys.path.insert(0, os.environ["VOXELPIPE_SITE"])
+from theme_files import repair_theme
 
 project = "VoxelPipe"
 author = "The VoxelPipe authors"
 copyright = "2026 The VoxelPipe authors"
 version = release = os.environ["VOXELPIPE_VERSION"]
-extensions = ["myst_parser", "breathe", "sphinx.ext.autodoc"]
+extensions = ["myst_parser", "breathe", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 html_theme = "furo"
 html_title = f"VoxelPipe {release}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_js_files = ["site.js"]
 html_show_sourcelink = False
 html_theme_options = {"sidebar_hide_name": False, "navigation_with_keys": True}
 pygments_style = "friendly"
+pygments_dark_style = "monokai"
 myst_heading_anchors = 3
 myst_enable_extensions = ["colon_fence"]
 breathe_projects = {"voxelpipe": os.environ["VOXELPIPE_DOXYGEN_XML"]}
@@ -50,5 +56,11 @@ def fields_of(app, what, name, obj, options, lines):
     lines[:] = out
 
 
+def finished(app, exception):
+    if exception is None:
+        repair_theme(pathlib.Path(app.outdir) / "_static")
+
+
 def setup(app):
+    app.connect("build-finished", finished)
     app.connect("autodoc-process-docstring", fields_of)

@@ -21,6 +21,8 @@ SITE = ROOT / "docs" / "site"
 # Document of the repository: page of the site.
 PAGES = {
     "docs/guide.md": "guide", "docs/tool.md": "tool", "docs/scale.md": "scale", "python/README.md": "python", "docs/gallery/README.md": "gallery/index",
+    "python/tutorials/volume.md": "tutorials/volume", "python/tutorials/colours.md": "tutorials/colours", "python/tutorials/scan.md": "tutorials/scan",
+    "python/tutorials/network.md": "tutorials/network",
     "docs/design.md": "design", "docs/pipeline.md": "pipeline", "docs/performance.md": "performance", "docs/optimizations.md": "optimizations",
     "docs/performance_tables.md": "performance_tables",
     "docs/rejected.md": "rejected", "docs/contributing.md": "contributing", "docs/extending.md": "extending", "docs/release.md": "release", "packaging/README.md": "packaging",
@@ -74,16 +76,19 @@ def main():
     shutil.rmtree(args.out, ignore_errors=True)
     (args.out / "_static").mkdir(parents=True)
     (args.out / "gallery").mkdir()
+    (args.out / "tutorials").mkdir()
     converter = Converter(args.out, args.repository)
     for source, page in PAGES.items():
         if page != "index":
             (args.out / f"{page}.md").write_text(converter.markdown(source, page), encoding="utf-8")
     with (args.out / "performance.md").open("a", encoding="utf-8") as f:
         f.write(history.page(ROOT / "records" / "history.csv", args.out / "_static" / "history.svg"))
-    for name in ("conf.py", "index.md"):
+    for name in ("conf.py", "index.md", "solids.md"):
         shutil.copy(SITE / name, args.out / name)
-    shutil.copy(SITE / "site.css", args.out / "_static" / "site.css")
+    for name in ("site.css", "site.js"):
+        shutil.copy(SITE / name, args.out / "_static" / name)
     converter.picture("docs/lighthouse.png")
+    converter.picture("docs/lighthouse_cut.png")
     write_api(args.out, args.xml, (ROOT / "python" / "src" / "grid.cpp").read_text(encoding="utf-8"))
 
 

@@ -40,16 +40,24 @@ using triangle_array = nb::ndarray<const std::uint32_t, nb::shape<-1, 3>, nb::c_
             array_view<const glm::uvec3>(reinterpret_cast<const glm::uvec3*>(triangles.data()), triangles.shape(0))};
 }
 
-// Throws ValueError unless a (nz, ny, nx, ...) array has the grid's shape, and rows of `columns` values.
+// Throws ValueError unless a (nz, ny, nx, ...) array has the grid's shape, and rows of `columns` values. `what` names
+// the argument.
 template <class Array>
-void expect_shape(const Array& out, const grid& g, std::initializer_list<std::size_t> tail = {},
+void expect_shape(const Array& a, const grid& g, const char* what, std::initializer_list<std::size_t> tail = {},
                   std::size_t last_axis = 0) {
-    const auto extent = [&](int a) { return static_cast<std::size_t>(g.extent[a]); };
-    bool fits = out.ndim() == 3 + tail.size() && out.shape(0) == extent(2) && out.shape(1) == extent(1) &&
-                out.shape(2) == (last_axis != 0 ? last_axis : extent(0));
-    std::size_t axis = 3;
-    for (const std::size_t n : tail) fits = fits && out.shape(axis++) == n;
-    if (!fits) throw nb::value_error("the array to draw into does not have the grid's shape (nz, ny, nx)");
+    std::vector<std::size_t> wanted{static_cast<std::size_t>(g.extent.z), static_cast<std::size_t>(g.extent.y),
+                                    last_axis != 0 ? last_axis : static_cast<std::size_t>(g.extent.x)};
+    wanted.insert(wanted.end(), tail);
+    const std::vector<std::size_t> found(a.shape_ptr(), a.shape_ptr() + a.ndim());
+    if (found == wanted) return;
+    const auto text = [](const std::vector<std::size_t>& shape) {
+        std::string t;
+        for (const std::size_t n : shape) t += (t.empty() ? "(" : ", ") + std::to_string(n);
+        return t + ')';
+    };
+    throw nb::value_error(
+        (std::string(what) + " has the shape " + text(found) + ", the grid's is " + text(wanted) + " (nz, ny, nx)")
+            .c_str());
 }
 
 // An array of NumPy that owns `values`.
@@ -66,10 +74,11 @@ void bind_grid(nb::module_& m);
 void bind_surface(nb::module_& m);
 void bind_solid(nb::module_& m);
 void bind_distance(nb::module_& m);
-void bind_bake_float(nb::module_& m);
-void bind_bake_integer(nb::module_& m);
 void bind_sparse_float(nb::module_& m);
 void bind_sparse_integer(nb::module_& m);
 void bind_files(nb::module_& m);
+void bind_lists(nb::module_& m);
+void bind_octree(nb::module_& m);
+void bind_scene(nb::module_& m);
 
 } // namespace voxelpipe::python

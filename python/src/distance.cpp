@@ -65,8 +65,8 @@ nb::dict distance_field(const position_array& positions, const triangle_array& t
     const distance_options options =
         options_named(band, sign, repair_name, bodies_name, max_hole_edges, closing, corners);
     const grid samples = corners ? g.at_corners() : g;
-    expect_shape(out, samples);
-    if (nearest) expect_shape(*nearest, samples);
+    expect_shape(out, samples, "the result");
+    if (nearest) expect_shape(*nearest, samples, "the array of triangles");
     const mesh_view<> mesh = view_of(positions, triangles);
     status s;
     {

@@ -6,8 +6,10 @@
 #include <nanobind/operators.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <new>
-#include <sstream>
+#include <string>
 #include <tuple>
 
 namespace voxelpipe::python {
@@ -21,14 +23,61 @@ bounding_box box_of(const triple_of_double& low, const triple_of_double& high) {
     return {to_vector(low), to_vector(high)};
 }
 
+// The shortest text that reads back as the same number.
+std::string shortest(double value) {
+    char text[32];
+    const auto end = std::to_chars(text, text + sizeof(text), value).ptr;
+    return {text, end};
+}
+std::string tuple_text(const glm::dvec3& v) {
+    return '(' + shortest(v.x) + ", " + shortest(v.y) + ", " + shortest(v.z) + ')';
+}
+std::string shape_text(const glm::ivec3& extent) {
+    return '(' + std::to_string(extent.z) + ", " + std::to_string(extent.y) + ", " + std::to_string(extent.x) + ')';
+}
+
+// An expression that gives the grid.
 std::string describe(const grid& g) {
-    std::ostringstream text;
-    text.precision(10);
-    const glm::dvec3 corner = g.part_origin();
-    text << "Grid(origin=(" << corner.x << ", " << corner.y << ", " << corner.z << "), voxel_size=(" << g.voxel_size.x
-         << ", " << g.voxel_size.y << ", " << g.voxel_size.z << "), shape=(" << g.extent.z << ", " << g.extent.y << ", "
-         << g.extent.x << "))";
-    return text.str();
+    const grid all = g.uncropped();
+    std::string text = "Grid(origin=" + tuple_text(all.part_origin()) + ", voxel_size=" + tuple_text(g.voxel_size) +
+                       ", shape=" + shape_text(all.extent) + ')';
+    if (g.extent != all.extent) text += ".crop(" + shape_text(g.offset) + ", " + shape_text(g.extent) + ')';
+    return text;
+}
+
+// Conversions of arrays are written in Python.
+struct conversion {
+    const char *name, *signature;
+};
+constexpr conversion zyx_call{"zyx", "def zyx(self, ijk: typing.Any) -> tuple[typing.Any, typing.Any, typing.Any]"};
+constexpr conversion index_call{"index", "def index(self, ijk: typing.Any) -> typing.Any"};
+constexpr conversion to_xyz_call{"to_xyz", "def to_xyz(self, ijk: typing.Any) -> typing.Any"};
+constexpr conversion to_ijk_call{"to_ijk", "def to_ijk(self, xyz: typing.Any) -> typing.Any"};
+constexpr conversion ijk_call{"ijk", "def ijk(self, dense: typing.Any) -> typing.Any"};
+
+nb::object convert(const conversion& how, const grid& g, const nb::object& what) {
+    return nb::module_::import_("voxelpipe._axes").attr(how.name)(g, what);
+}
+
+// A number of voxels along an axis that no grid has is refused by its name.
+void check_resolution(std::int64_t n) {
+    if (n < 1 || n > grid::max_extent)
+        throw nb::value_error(
+            ("resolution is 1 to 2^20 voxels along the longest side, not " + std::to_string(n)).c_str());
+}
+void check_shape(const triple_of_int& shape, const char* what) {
+    for (const std::int64_t n : shape)
+        if (n < 1 || n > grid::max_extent)
+            throw nb::value_error((std::string(what) + " is (nz, ny, nx), each from 1 to 2^20, not (" +
+                                   std::to_string(shape[0]) + ", " + std::to_string(shape[1]) + ", " +
+                                   std::to_string(shape[2]) + ')')
+                                      .c_str());
+}
+void check_voxel_size(const triple_of_double& size) {
+    for (const double s : size)
+        if (!(s > 0) || !std::isfinite(s))
+            throw nb::value_error(
+                ("voxel_size is above 0 and finite, not " + shortest(s) + ": a bad voxel size").c_str());
 }
 
 } // namespace
@@ -41,7 +90,11 @@ void bind_grid(nb::module_& m) {
         .def(
             "__init__",
             [](grid* self, const triple_of_double& origin, const triple_of_double& voxel_size,
-               const triple_of_int& shape) { new (self) grid(make_grid(origin, voxel_size, shape)); },
+               const triple_of_int& shape) {
+                check_voxel_size(voxel_size);
+                check_shape(shape, "shape");
+                new (self) grid(make_grid(origin, voxel_size, shape));
+            },
             nb::arg("origin"), nb::arg("voxel_size"), nb::arg("shape"),
             "origin: world position (x, y, z) of the low corner. voxel_size: world units along x, y and z.\n"
             "shape: (nz, ny, nx), each from 1 to 2^20. Raises ValueError.")
@@ -76,6 +129,41 @@ void bind_grid(nb::module_& m) {
             },
             nb::arg("voxel"), "World position of the centre of voxel (i, j, k), counted along x, y and z.")
         .def(
+            "zyx", [](const grid& g, const nb::object& ijk) { return convert(zyx_call, g, ijk); }, nb::arg("ijk"),
+            nb::sig(zyx_call.signature),
+            "The index of voxels into an array of the grid: for voxels (n, 3) with columns x, y, z the columns z, y, "
+            "x.\n"
+            "Raises IndexError for a voxel outside of the grid, which numpy would take for one at the other end.\n"
+            "Example: ``occupied[grid.zyx(voxels)] = True``")
+        .def(
+            "index", [](const grid& g, const nb::object& ijk) { return convert(index_call, g, ijk); }, nb::arg("ijk"),
+            nb::sig(index_call.signature),
+            "The place of voxels (n, 3), columns x, y, z, in the memory of an array of the grid: (k * ny + j) * nx + "
+            "i,\n"
+            "int64. Raises IndexError for a voxel outside of the grid.\n"
+            "Example: ``values.reshape(-1)[grid.index(voxels)]``")
+        .def(
+            "to_xyz", [](const grid& g, const nb::object& ijk) { return convert(to_xyz_call, g, ijk); }, nb::arg("ijk"),
+            nb::sig(to_xyz_call.signature),
+            "World positions (n, 3) of the centres of voxels (n, 3), columns x, y, z: float64.\n"
+            "Example: ``points = grid.to_xyz(voxels)``")
+        .def(
+            "to_ijk", [](const grid& g, const nb::object& xyz) { return convert(to_ijk_call, g, xyz); }, nb::arg("xyz"),
+            nb::sig(to_ijk_call.signature),
+            "The voxels (n, 3), columns x, y, z, in which world positions (n, 3) lie: int32; of two that share a face "
+            "the\n"
+            "upper one. A position outside of the grid gives a voxel outside of it. Raises ValueError for one that is "
+            "not\n"
+            "finite or more than 2^31 voxels away.\n"
+            "Example: ``voxels = grid.to_ijk(points)``")
+        .def(
+            "ijk", [](const grid& g, const nb::object& dense) { return convert(ijk_call, g, dense); }, nb::arg("dense"),
+            nb::sig(ijk_call.signature),
+            "The voxels (n, 3), columns x, y, z, of an array (nz, ny, nx) that are not zero: int32, in the order of "
+            "the\n"
+            "array.\n"
+            "Example: ``voxels = grid.ijk(vp.voxelize(mesh, grid))``")
+        .def(
             "_relative_to_origin",
             [](const grid& g) {
                 grid moved = g;
@@ -104,18 +192,21 @@ void bind_grid(nb::module_& m) {
     m.def(
         "fit_longest",
         [](const triple_of_double& low, const triple_of_double& high, std::int64_t n) {
+            check_resolution(n);
             return checked(fit_longest(box_of(low, high), static_cast<int>(std::clamp<std::int64_t>(n, -1, 1 << 30))));
         },
         nb::arg("low"), nb::arg("high"), nb::arg("n"));
     m.def(
         "fit_shape",
         [](const triple_of_double& low, const triple_of_double& high, const triple_of_int& shape) {
+            check_shape(shape, "resolution");
             return checked(fit(box_of(low, high), extent_of(shape)));
         },
         nb::arg("low"), nb::arg("high"), nb::arg("shape"));
     m.def(
         "fit_voxel_size",
         [](const triple_of_double& low, const triple_of_double& high, const triple_of_double& size, int padding) {
+            check_voxel_size(size);
             return checked(fit_voxel_size(box_of(low, high), to_vector(size), padding));
         },
         nb::arg("low"), nb::arg("high"), nb::arg("voxel_size"), nb::arg("padding"));

@@ -9,9 +9,10 @@ NB_MODULE(_core, m) {
     python::bind_surface(m);
     python::bind_solid(m);
     python::bind_distance(m);
-    python::bind_bake_float(m);
-    python::bind_bake_integer(m);
     python::bind_sparse_float(m);
     python::bind_sparse_integer(m);
     python::bind_files(m);
+    python::bind_lists(m);
+    python::bind_octree(m);
+    python::bind_scene(m);
 }

@@ -73,9 +73,11 @@ template <class T>
     options.rule = named<fill_rule>(
         "fill", fill,
         {{"nonzero", fill_rule::nonzero}, {"even_odd", fill_rule::even_odd}, {"positive", fill_rule::positive}});
-    const auto extent_named = named<solid_extent>(
-        "extent", extent,
-        {{"outer", solid_extent::outer}, {"centre", solid_extent::centre}, {"inner", solid_extent::inner}});
+    const auto extent_named = named<solid_extent>("extent", extent,
+                                                  {{"outer", solid_extent::outer},
+                                                   {"centre", solid_extent::centre},
+                                                   {"center", solid_extent::centre},
+                                                   {"inner", solid_extent::inner}});
     options.repair = named<repair>("repair", repair_name,
                                    {{"none", repair::none},
                                     {"close_holes", repair::close_holes},

@@ -5,28 +5,40 @@
 namespace voxelpipe::python {
 namespace {
 
-// Values of columns [first_column, first_column + num_columns), one row for each voxel.
-nb::tuple bake(const position_array& positions, const triangle_array& triangles, const grid& g, const std::string& rule,
-               const array<const float, 2>& values, std::size_t first_column, std::size_t num_columns,
-               bool per_triangle, const std::string& blend_name, unsigned threads) {
+// Channels of fewer than three columns take the first ones.
+sparse_values<float> first_columns(sparse_values<float>&& drawn, std::size_t columns) {
+    if (columns == 3) return std::move(drawn);
+    for (std::size_t i = 0; i < drawn.num_voxels; ++i)
+        for (std::size_t c = 0; c < columns; ++c) drawn.values[i * columns + c] = drawn.values[3 * i + c];
+    drawn.values.resize(drawn.num_voxels * columns);
+    return std::move(drawn);
+}
+
+// Values of columns [first_column, first_column + num_columns), one row for each voxel; 1 to 3 columns.
+nb::tuple bake_floats(const position_array& positions, const triangle_array& triangles, const grid& g,
+                      const std::string& rule, const array<const float, 2>& values, std::size_t first_column,
+                      std::size_t num_columns, bool per_triangle, const std::string& blend_name, bool with_voxels,
+                      unsigned threads) {
+    if (num_columns < 1 || num_columns > 3) throw nb::value_error("a pass takes 1 to 3 columns");
     const auto call = make_bake_call<float>(positions, triangles, g, rule, values, {first_column, num_columns},
                                             per_triangle, threads);
-    auto drawn = with_components(num_columns, [&]<int Components>() {
-        return with_blend(blend_name, [&]<class Blend>() {
-            const nb::gil_scoped_release released;
-            return draw_sparse_values<float, Components, Blend>(call, blend_name == "mean");
-        });
+    // A lone column is drawn as one of three where that is rare: a third of the time to compile.
+    auto drawn = with_blend(blend_name, [&]<class Blend>() {
+        const nb::gil_scoped_release released;
+        if constexpr (std::is_same_v<Blend, blend::add>)
+            if (num_columns == 1) return draw_sparse_values<float, 1, Blend>(call, blend_name == "mean", with_voxels);
+        return first_columns(draw_sparse_values<float, 3, Blend>(call, blend_name == "mean", with_voxels), num_columns);
     });
-    nb::dict counts = report(drawn.result);
-    return nb::make_tuple(to_numpy(std::move(drawn.values), {drawn.num_voxels, num_columns}), counts);
+    const std::size_t n = drawn.num_voxels;
+    return give(std::move(drawn), {n, num_columns}, with_voxels);
 }
 
 } // namespace
 
 void bind_sparse_float(nb::module_& m) {
-    m.def("sparse_float", &bake, nb::arg("positions"), nb::arg("triangles"), nb::arg("grid"), nb::arg("coverage"),
-          nb::arg("values"), nb::arg("first_column"), nb::arg("num_columns"), nb::arg("per_triangle"), nb::arg("blend"),
-          nb::arg("threads"));
+    m.def("sparse_float", &bake_floats, nb::arg("positions"), nb::arg("triangles"), nb::arg("grid"),
+          nb::arg("coverage"), nb::arg("values"), nb::arg("first_column"), nb::arg("num_columns"),
+          nb::arg("per_triangle"), nb::arg("blend"), nb::arg("with_voxels"), nb::arg("threads"));
 }
 
 } // namespace voxelpipe::python

@@ -6,18 +6,18 @@ namespace voxelpipe::python {
 namespace {
 
 // Values of one column of 64-bit integers, one for each voxel.
-nb::tuple bake(const position_array& positions, const triangle_array& triangles, const grid& g, const std::string& rule,
-               const array<const std::int64_t, 2>& values, std::size_t column, bool per_triangle,
-               const std::string& blend_name, unsigned threads) {
+nb::tuple bake_integers(const position_array& positions, const triangle_array& triangles, const grid& g,
+                        const std::string& rule, const array<const std::int64_t, 2>& values, std::size_t column,
+                        bool per_triangle, const std::string& blend_name, bool with_voxels, unsigned threads) {
     if (blend_name == "mean") throw nb::value_error("integers have no mean");
     const auto call =
         make_bake_call<std::int64_t>(positions, triangles, g, rule, values, {column, 1}, per_triangle, threads);
     auto drawn = with_blend(blend_name, [&]<class Blend>() {
         const nb::gil_scoped_release released;
-        return draw_sparse_values<std::int64_t, 1, Blend>(call, false);
+        return draw_sparse_values<std::int64_t, 1, Blend>(call, false, with_voxels);
     });
-    nb::dict counts = report(drawn.result);
-    return nb::make_tuple(to_numpy(std::move(drawn.values), {drawn.num_voxels}), counts);
+    const std::size_t n = drawn.num_voxels;
+    return give(std::move(drawn), {n}, with_voxels);
 }
 
 // The voxels alone.
@@ -41,8 +41,9 @@ nb::tuple list_voxels(const position_array& positions, const triangle_array& tri
 } // namespace
 
 void bind_sparse_integer(nb::module_& m) {
-    m.def("sparse_integer", &bake, nb::arg("positions"), nb::arg("triangles"), nb::arg("grid"), nb::arg("coverage"),
-          nb::arg("values"), nb::arg("column"), nb::arg("per_triangle"), nb::arg("blend"), nb::arg("threads"));
+    m.def("sparse_integer", &bake_integers, nb::arg("positions"), nb::arg("triangles"), nb::arg("grid"),
+          nb::arg("coverage"), nb::arg("values"), nb::arg("column"), nb::arg("per_triangle"), nb::arg("blend"),
+          nb::arg("with_voxels"), nb::arg("threads"));
     m.def("sparse_voxels", &list_voxels, nb::arg("positions"), nb::arg("triangles"), nb::arg("grid"),
           nb::arg("coverage"), nb::arg("threads"));
 }

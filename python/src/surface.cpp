@@ -10,7 +10,7 @@ using bits = target<bit, blend::bit_or>;
 
 nb::dict voxelize_mask(const position_array& positions, const triangle_array& triangles, const grid& g,
                        const std::string& rule, const array<std::uint8_t, 3>& out, unsigned threads) {
-    expect_shape(out, g);
+    expect_shape(out, g, "the result");
     const voxelize_options options{coverage_named(rule)};
     status s;
     {
@@ -24,7 +24,7 @@ nb::dict voxelize_mask(const position_array& positions, const triangle_array& tr
 
 nb::dict voxelize_bits(const position_array& positions, const triangle_array& triangles, const grid& g,
                        const std::string& rule, const array<std::uint32_t, 3>& out, unsigned threads) {
-    expect_shape(out, g, {}, (static_cast<std::size_t>(g.extent.x) + 31) / 32);
+    expect_shape(out, g, "the result", {}, (static_cast<std::size_t>(g.extent.x) + 31) / 32);
     const voxelize_options options{coverage_named(rule)};
     status s;
     {

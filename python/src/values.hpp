@@ -54,30 +54,16 @@ auto with_blend(std::string_view name, F&& f) {
     throw nb::value_error(("blend is 'mean', 'sum', 'min', 'max' or 'last', not '" + std::string(name) + "'").c_str());
 }
 
-// Divides the sums of a mean, each quotient rounded once, and puts `fill` where there is no fragment. `values` has
-// `components` for each of the counts.
+// Divides the sums of a mean by the numbers of fragments, each quotient rounded once. `values` has `components` for
+// each of the counts, none of which is 0.
 template <class T>
-void finish(T* values, const std::uint32_t* counts, std::size_t n, std::size_t components, bool is_mean, T fill,
-            unsigned threads) {
+void divide(T* values, const std::uint32_t* counts, std::size_t n, std::size_t components, unsigned threads) {
     constexpr std::size_t block = std::size_t{1} << 16;
     const unsigned workers = threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
     cpu::parallel_for(workers, (n + block - 1) / block, [&](unsigned, std::size_t b) {
-        for (std::size_t i = b * block; i < std::min(n, (b + 1) * block); ++i) {
-            T* const value = values + i * components;
-            if (counts[i] == 0)
-                std::fill_n(value, components, fill);
-            else if (is_mean)
-                for (std::size_t c = 0; c < components; ++c) value[c] /= static_cast<T>(counts[i]);
-        }
+        for (std::size_t i = b * block; i < std::min(n, (b + 1) * block); ++i)
+            for (std::size_t c = 0; c < components; ++c) values[i * components + c] /= static_cast<T>(counts[i]);
     });
-}
-
-// Calls f.template operator()<Components>() for 1 or 3, the numbers that are compiled; callers draw more in passes.
-template <class F>
-auto with_components(std::size_t n, F&& f) {
-    if (n == 1) return f.template operator()<1>();
-    if (n == 3) return f.template operator()<3>();
-    throw nb::value_error("a pass takes 1 or 3 columns");
 }
 
 } // namespace voxelpipe::python

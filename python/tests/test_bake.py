@@ -104,11 +104,40 @@ def test_sparse_in_a_grid_that_no_memory_holds():
     assert len(voxels) > 1000 and np.abs(voxels * 2.0**-20 - 0.3).max() < 1.1e-4
 
 
+def test_dense_memory_is_the_results_alone():
+    """The values are folded in bricks: a dense array beside the result would show."""
+    import tracemalloc
+
+    mesh = sphere(levels=1)
+    grid = vp.fit(mesh, 96)
+    colors = np.full((len(mesh[0]), 3), 77, np.uint8)
+    tracemalloc.start()
+    baked = vp.bake(mesh, grid, {"rgb": colors, "x": mesh[0][:, 0]})
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 1.5 * sum(a.nbytes for a in baked.values())
+
+
+@pytest.mark.parametrize("extent", ["outer", "centre", "inner"])
+def test_solids_as_lists_and_their_values(scene, extent):
+    mesh, grid, _ = scene
+    ids = np.arange(len(mesh[1]), dtype=np.int32)
+    voxels, rows = vp.sparse(mesh, grid, {"id": ids, "x": mesh[0][:, 0]}, solid="nonzero", extent=extent, fill=-5)
+    inside = vp.solid(mesh, grid, extent=extent)
+    assert isinstance(voxels, vp.VoxelList) and np.array_equal(vp.dense(voxels, True, grid), inside)
+    assert np.array_equal(voxels, vp.sparse(mesh, grid, solid="nonzero", extent=extent)[0])
+    dense = vp.bake(mesh, grid, {"id": ids, "x": mesh[0][:, 0]}, fill=-5)
+    for name, row in rows.items():
+        assert np.array_equal(row, dense[name][grid.zyx(voxels)])
+    own = vp.sparse(mesh, grid, ["triangle"], solid="nonzero", extent=extent)[1]["triangle"]
+    assert np.array_equal(own, vp.bake(mesh, grid, "triangle")["triangle"][grid.zyx(voxels)])
+
+
 def test_values_must_fit_the_mesh(scene):
     mesh, grid, _ = scene
     with pytest.raises(ValueError, match="a: 3 rows of values"):
         vp.bake(mesh, grid, {"a": np.zeros(3)})
-    with pytest.raises(ValueError, match="blend is"):
+    with pytest.raises(ValueError, match="blend is one of"):
         vp.bake(mesh, grid, {"a": np.zeros(len(mesh[0]))}, blend="over")
     tetrahedron = (
         np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32),

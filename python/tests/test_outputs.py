@@ -32,7 +32,6 @@ def model(tmp_path):
 
 
 def test_a_model_and_its_files_stay(model, tmp_path, monkeypatch):
-    pytest.importorskip("trimesh")
     monkeypatch.chdir(tmp_path)
     grid = vp.fit("model.obj", 8)
     surface = vp.voxelize("model.obj", grid)
@@ -43,6 +42,10 @@ def test_a_model_and_its_files_stay(model, tmp_path, monkeypatch):
             vp.save(path, surface, grid)
     with pytest.raises(ValueError, match="a file of"):
         vp.view(surface, grid).save("hard.html")
+    os.rename("hard.html", "out.height.nrrd")  # what one of several files would be called
+    with pytest.raises(ValueError, match="a file of"):
+        vp.save("out.nrrd", {"occupancy": surface, "height": surface.astype(np.uint8)}, grid)
+    os.rename("out.height.nrrd", "hard.html")
     assert model.read_text() == MODEL
     assert sorted(os.listdir()) == ["hard.html", "model.mtl", "model.obj", "soft.npy"]
     vp.save("other.npy", surface, grid)

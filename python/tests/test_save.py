@@ -120,18 +120,59 @@ def test_page(scene, tmp_path):
 
 def test_failures_leave_no_file(scene, tmp_path):
     _, grid, surface, color = scene
-    with pytest.raises(ValueError, match="formats are"):
-        vp.save(tmp_path / "a.xyz", surface, grid)
+    with pytest.raises(ValueError, match="formats are .npy, .npz, .vox"):
+        vp.save(tmp_path / "a.abc", surface, grid)
     with pytest.raises(ValueError, match="one array"):
         vp.save(tmp_path / "a.npy", {"a": surface, "b": color}, grid)
     with pytest.raises(ValueError, match="shape"):
         vp.save(tmp_path / "a.png", surface[1:], grid)
     with pytest.raises(ValueError, match="background"):
         vp.save(tmp_path / "a.png", surface, grid, background="pink")
-    with pytest.raises(IndexError):
+    with pytest.raises(IndexError, match="voxel 0 is .0, 0, 99. .x, y, z."):
         vp.save(tmp_path / "a.nvdb", (np.array([[0, 0, 99]], np.int32), {}), grid)
     with pytest.raises(TypeError, match="png"):
         vp.save(tmp_path / "a.npy", surface, grid, zoom=2)
     with pytest.raises(OSError):
         vp.save(tmp_path / "none" / "a.npy", surface, grid)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_every_format_of_the_tool_is_written(scene, tmp_path):
+    """Of dense arrays and of a list, which are the same voxels, the same bytes where the format holds voxels alone."""
+    mesh, grid, surface, color = scene
+    values = {"occupancy": surface, "color": color, "height": np.where(surface, np.float32(2.5), np.float32(0))}
+    voxels = grid.ijk(surface)
+    listed = (voxels, {n: a[grid.zyx(voxels)] for n, a in values.items() if n != "occupancy"})
+    assert {".npy", ".npz", ".vox", ".schem", ".binvox", ".vti", ".nrrd", ".zarr", ".glb", ".stl", ".nvdb"} < set(vp.formats())
+    for extension in vp.formats():
+        if extension in (".npy", ".png", ".html"):  # which other tests write
+            continue
+        for name, what in (("dense", values), ("list", listed)):
+            files = vp.save(tmp_path / f"{name}{extension}", what, grid)
+            assert files and all((tmp_path / f).exists() for f in files), extension
+    for extension in (".vox", ".schem", ".binvox", ".glb", ".obj", ".ply", ".stl", ".xyz", ".nvdb"):
+        assert (tmp_path / f"dense{extension}").read_bytes() == (tmp_path / f"list{extension}").read_bytes(), extension
+    rows = np.loadtxt(tmp_path / "dense.xyz")
+    assert len(rows) == surface.sum()
+    at = grid.zyx(grid.to_ijk(rows[:, :3]))
+    assert surface[at].all() and np.array_equal(rows[:, 3:], color[at])
+    vp.save(tmp_path / "plain.ply", surface, grid)
+    vp.save(tmp_path / "merged.ply", surface, grid, merge=True)
+    assert (tmp_path / "merged.ply").stat().st_size < (tmp_path / "plain.ply").stat().st_size
+
+
+def test_tools_formats_say_what_they_do_not_hold(scene, tmp_path):
+    _, grid, surface, _ = scene
+    flat = vp.Grid((0, 0, 0), (1, 2, 1), grid.shape)
+    with pytest.raises(ValueError, match="one voxel size"):
+        vp.save(tmp_path / "a.vox", surface, flat)
+    with pytest.raises(ValueError, match="channel name"):
+        vp.save(tmp_path / "a.vti", {"a b": surface}, grid)
+    with pytest.raises(ValueError, match="1 to 4"):
+        vp.save(tmp_path / "a.vti", {"a": np.zeros((*grid.shape, 5), np.float32)}, grid)
+    (tmp_path / "not_ours.zarr").mkdir()
+    (tmp_path / "not_ours.zarr" / "file").write_text("")
+    with pytest.raises(vp.WriteError, match="not_ours.zarr") as caught:
+        vp.save(tmp_path / "not_ours.zarr", surface, grid)
+    assert isinstance(caught.value, OSError) and isinstance(caught.value, ValueError)
+    assert [p.name for p in tmp_path.iterdir()] == ["not_ours.zarr"]

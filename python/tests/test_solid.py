@@ -177,3 +177,29 @@ def test_bad_options():
         vp.solid(mesh, grid, repair="exterior", closing=65)
     with pytest.raises(ValueError, match="crop"):
         vp.solid(mesh, grid.crop((0, 0, 0), (4, 4, 4)), repair="exterior")
+
+
+def test_packed_and_tiled_solids_are_the_same_voxels():
+    mesh = sphere(levels=3)
+    grid = vp.fit(mesh, (50, 60, 70))
+    inside = vp.solid(mesh, grid, extent="centre")
+    words = vp.solid(mesh, grid, extent="centre", packed=True)
+    assert words.dtype == np.uint32 and words.shape == (50, 60, 3)
+    bits = np.unpackbits(words.view(np.uint8), axis=-1, bitorder="little")[..., :70].astype(bool)
+    assert np.array_equal(bits, inside)
+    voxels, cubes = vp.tiles(mesh, grid, extent="centre")
+    assert len(cubes) > 3 and len(voxels) + (cubes[:, 3] ** 3).sum() == inside.sum()
+    made = vp.dense(voxels, True, grid)
+    for x, y, z, side in cubes:
+        assert not made[z : z + side, y : y + side, x : x + side].any()
+        made[z : z + side, y : y + side, x : x + side] = True
+    assert np.array_equal(made, inside)
+    part = grid.crop((3, 4, 5), (30, 31, 33))
+    assert np.array_equal(vp.dense(vp.sparse(mesh, part, solid="nonzero", extent="centre")[0], True, part), inside[3:33, 4:35, 5:38])
+
+
+def test_open_solids_as_lists_warn():
+    v, f = box((2, 2, 2), (8, 8, 8))
+    grid = vp.Grid((0, 0, 0), (1, 1, 1), (10, 10, 10))
+    with pytest.warns(vp.OpenMeshWarning, match="36 rows"):
+        vp.tiles((v, np.delete(f, [8, 9], axis=0)), grid)

@@ -1,16 +1,41 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""Checked by mypy, not run: the package has types, and they are those that a program expects."""
+"""Checked by mypy --strict, not run: the package has types, they are those that a program expects, and mistakes are found.
+A mistake that is not found leaves its comment without a use, which --strict reports."""
 
 import numpy as np
+import numpy.typing as npt
 import voxelpipe as vp
 
+Array = npt.NDArray[np.float32]
 
-def occupied(vertices: np.ndarray, triangles: np.ndarray) -> int:
-    grid: vp.Grid = vp.fit((vertices, triangles), 64)
+
+def occupied(vertices: Array, triangles: npt.NDArray[np.int64]) -> int:
+    mesh = (vertices, triangles)
+    grid: vp.Grid = vp.fit(mesh, 64)
     shape: tuple[int, int, int] = grid.shape
-    picture: np.ndarray = vp.render(vp.voxelize((vertices, triangles), grid), grid)
-    lists: vp.Fragments = vp.fragments((vertices, triangles), grid)
-    field: np.ndarray = vp.distance((vertices, triangles), grid, "whole", corners=True)
-    del picture, lists, field
+    surface: npt.NDArray[np.bool_] = vp.voxelize(mesh, grid)
+    words: npt.NDArray[np.uint32] = vp.solid(mesh, grid, packed=True)
+    picture: npt.NDArray[np.uint8] = vp.render(surface, grid)
+    lists: vp.Fragments = vp.fragments(mesh, grid)
+    field: npt.NDArray[np.float32] = vp.distance(mesh, grid, "whole", corners=True)
+    baked: dict[str, npt.NDArray[np.uint8]] = vp.bake("lighthouse.glb", grid)
+    model: vp.Model = vp.load_model("lighthouse.glb")
+    voxels, attributes = vp.sparse(model, grid, ["color", "normal"], solid="nonzero", extent="center")
+    listed: vp.VoxelList = voxels
+    surface[grid.zyx(listed)] = True
+    vp.save("a.vox", (voxels, attributes), grid, up="z", merge=True)
+    del words, picture, lists, field, baked
     return shape[0]
+
+
+def mistakes(vertices: Array, triangles: npt.NDArray[np.int64], grid: vp.Grid) -> None:
+    mesh = (vertices, triangles)
+    vp.voxelize(mesh, 64)  # type: ignore[call-overload]
+    vp.voxelize(mesh, grid, "conservativ")  # type: ignore[call-overload]
+    vp.solid(mesh, grid, repair="holes")  # type: ignore[call-overload]
+    vp.voxelize(5, grid)  # type: ignore[call-overload]
+    vp.save("a.npy", vp.voxelize(mesh, grid), grid, nonsense=1)  # type: ignore[call-arg]
+    vp.bake(mesh, grid, {"rgb": vertices}, blend="median")  # type: ignore[call-overload]
+    vp.bake(mesh, grid, "colour")  # type: ignore[arg-type]
+    vp.fit(mesh, "64")  # type: ignore[arg-type]

@@ -12,41 +12,62 @@ same bytes on every machine and any number of threads.
     field = vp.distance(mesh, grid)          # float32, negative inside
     vp.save("surface.png", surface, grid)
 
-A mesh is a pair (vertices, triangles) of arrays, a mesh of trimesh, Open3D or PyVista, a path, or a list of those.
-Arrays of voxels are indexed [z, y, x].
+A mesh is a pair (vertices, triangles) of arrays, a mesh of trimesh, Open3D or PyVista, a path, a Model, or a list of those.
+Arrays of voxels are indexed [z, y, x]; lists of voxels have columns x, y, z: array[grid.zyx(voxels)].
 """
 
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError as _PackageNotFoundError
+from importlib.metadata import version as _version
 
+from ._axes import VoxelList, dense
 from ._bake import bake, sparse
 from ._core import Grid
 from ._distance import distance, distance_at
 from ._fit import fit
-from ._save import render, save
-from ._solid import OpenMeshWarning, solid
+from ._model import Material, Model, ModelWarning, Part, Texture, load_model
+from ._octree import Hits, Octree
+from ._save import WriteError, formats, render, save
+from ._solid import OpenMeshWarning, solid, tiles
 from ._surface import DroppedTrianglesWarning, Fragments, fragments, voxelize
 from ._view import View, view
+from ._visuals import instances, lines, points
 
 try:
-    __version__ = version("voxelpipe")
-except PackageNotFoundError:  # the folder alone, not installed
+    __version__ = _version("voxelpipe")
+except _PackageNotFoundError:  # the folder alone, not installed
     __version__ = "0"
 
 __all__ = [
     "DroppedTrianglesWarning",
     "Fragments",
     "Grid",
+    "Hits",
+    "Material",
+    "Model",
+    "ModelWarning",
+    "Octree",
     "OpenMeshWarning",
+    "Part",
+    "Texture",
     "View",
+    "VoxelList",
+    "WriteError",
     "bake",
+    "dense",
     "distance",
     "distance_at",
     "fit",
+    "formats",
     "fragments",
+    "instances",
+    "lines",
+    "load_model",
+    "points",
     "render",
     "save",
     "solid",
     "sparse",
+    "tiles",
     "view",
     "voxelize",
 ]

@@ -15,12 +15,8 @@ from typing import Any, Sequence
 
 import numpy as np
 
+from ._arrays import is_on_device
 from ._core import Grid
-
-
-def is_on_device(a: Any) -> bool:
-    """True if an array lies in a GPU's memory."""
-    return hasattr(a, "__cuda_array_interface__") or getattr(getattr(a, "device", None), "type", "cpu") == "cuda"
 
 
 def _module() -> Any:
@@ -36,6 +32,9 @@ def _module() -> Any:
 
 class _Torch:
     """Tensors of torch on one device."""
+
+    word = np.int32  # of packed bits: torch can do next to nothing with uint32
+    index = np.int64  # of numbers of triangles, by which all versions index
 
     def __init__(self, like: Any) -> None:
         import torch
@@ -87,6 +86,9 @@ class _Torch:
 
 class _Cupy:
     """Arrays of CuPy on one device."""
+
+    word = np.uint32
+    index = np.int32
 
     def __init__(self, like: Any) -> None:
         import cupy
@@ -261,7 +263,7 @@ def voxelize(m: DeviceMesh, grid: Grid, coverage: str, packed: bool) -> tuple[An
     *what, _positions = m.call(grid)
     nz, ny, nx = grid.shape
     if packed:
-        words = m.library.empty((nz, ny, (nx + 31) // 32), np.uint32)
+        words = m.library.empty((nz, ny, (nx + 31) // 32), m.library.word)
         return words, _module().voxelize_bits(*what, coverage, m.library.pointer(words))
     out = m.library.empty((nz, ny, nx), np.uint8)
     counts = _module().voxelize_mask(*what, coverage, m.library.pointer(out))
@@ -341,8 +343,9 @@ def fragments(m: DeviceMesh, grid: Grid, coverage: str) -> tuple[list[Any], dict
     arrays = [
         lib.empty((n, 3), np.int32),
         lib.empty((n + 1,), np.int64),
-        lib.empty((f,), np.uint32),
+        lib.empty((f,), np.int32),  # the 32 bits of each number
         lib.empty((f, 3), np.float32),
     ]
     kept.copy(*(lib.pointer(a) for a in arrays))
+    arrays[2] = lib.convert(arrays[2], lib.index)
     return arrays, counts

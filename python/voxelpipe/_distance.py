@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -12,9 +12,10 @@ from . import _core
 from ._core import Grid
 from ._device import DeviceMesh
 from ._fit import fit
-from ._mesh import Mesh, MeshLike, as_mesh
+from ._mesh import Mesh, as_mesh
 from ._solid import OpenMeshWarning
 from ._surface import take_counts
+from ._types import Bodies, MeshLike, Repair, Sign, check_call, check_choice, check_grid, check_status, check_threads
 
 
 def _host_mesh(mesh: MeshLike) -> Mesh:
@@ -37,12 +38,12 @@ def _warn_of_holes(counts: dict[str, int], rows: str, repair: str) -> None:
 def distance(
     mesh: MeshLike,
     grid: Grid,
-    band: float | str = 3,
-    sign: str = "nonzero",
+    band: float | Literal["whole"] = 3,
+    sign: Sign = "nonzero",
     *,
-    repair: str = "none",
+    repair: Repair = "none",
     closing: int = 0,
-    bodies: str = "all",
+    bodies: Bodies = "all",
     max_hole_edges: int | None = None,
     corners: bool = False,
     nearest: bool = False,
@@ -54,22 +55,31 @@ def distance(
     It is exact: the float nearest to the distance from the snapped triangles, but for a share of 2^-25 of its last place.
     It is a distance to the mesh: where parts overlap, walls inside their union count.
 
-    band: samples further away than this many voxels (of the largest side) hold that distance, with their sign; "whole":
-        every sample holds its own, and a mesh without triangles gives infinity.
-    sign: what is inside and negative, as `fill` of solid(): "nonzero", "even_odd" or "positive"; "unsigned": nothing is.
-    repair, closing, bodies, max_hole_edges: as in solid(), for the sign; not with "unsigned". Distances are those of the
-        mesh as it is.
-    corners: samples at the corners of the voxels, one more along each axis, in place of their centres: sample [k, j, i]
-        lies at origin + (i, j, k) * voxel_size.
-    nearest: also returns the number of the nearest triangle, int64, of those with the same distance the first; of a list
-        of meshes they are numbered through. -1 beyond the band.
-    threads: 0 takes all cores. The result is the same for any number.
-    status: a dict that is filled with the call's counters, band_samples and those of solid() among them.
+    Args:
+        mesh, grid: as in voxelize().
+        band: samples further away than this many voxels (of the largest side) hold that distance, with their sign; "whole":
+            every sample holds its own, and a mesh without triangles gives infinity.
+        sign: what is inside and negative, as `fill` of solid(): "nonzero", "even_odd" or "positive"; "unsigned": nothing is.
+        repair, closing, bodies, max_hole_edges: as in solid(), for the sign; not with "unsigned". Distances are those of the
+            mesh as it is.
+        corners: samples at the corners of the voxels, one more along each axis, in place of their centres: sample [k, j, i]
+            lies at origin + (i, j, k) * voxel_size.
+        nearest: also returns the number of the nearest triangle, int64, of those with the same distance the first; of a list
+            of meshes they are numbered through. -1 beyond the band.
+        threads: 0 takes all cores. The result is the same for any number.
+        status: a dict that is filled with the call's counters, band_samples and those of solid() among them.
 
     Returns the distances, or (distances, nearest). A mesh of torch's tensors gives tensors. Warns with OpenMeshWarning
     where rows of samples prove that the mesh is not closed. Raises ValueError for a band that is not above 0 or not
     finite, IndexError for a triangle that names a vertex that does not exist, TypeError for a mesh in a GPU's memory.
+
+    Example:
+        >>> field = vp.distance(mesh, grid, band=3)
+        >>> field, triangle = vp.distance(mesh, grid, "whole", nearest=True)
     """
+    check_call("distance", grid, "conservative", threads, status)
+    for what, value, choices in (("sign", sign, Sign), ("repair", repair, Repair), ("bodies", bodies, Bodies)):
+        check_choice(what, value, choices)
     if isinstance(band, str):
         if band != "whole":
             raise ValueError(f'band is a number of voxels or "whole", not {band!r}')
@@ -110,10 +120,10 @@ def distance_at(
     mesh: MeshLike,
     points: Any,
     grid: Grid | None = None,
-    sign: str = "nonzero",
+    sign: Sign = "nonzero",
     *,
-    repair: str = "none",
-    bodies: str = "all",
+    repair: Repair = "none",
+    bodies: Bodies = "all",
     max_hole_edges: int | None = None,
     nearest: bool = False,
     threads: int = 0,
@@ -124,13 +134,24 @@ def distance_at(
     Points and triangles are snapped to the lattice of `grid`, wherever they lie; by default a grid of 1024 voxels along the
     mesh's longest side, whose lattice is finer than 2^-23 of that. Otherwise as distance() with band="whole".
 
-    sign, repair, bodies, max_hole_edges: as in distance(); repair is "none" or "close_holes".
-    nearest: also returns the number of each point's nearest triangle, int64.
-    status: a dict that is filled with the call's counters; bad_points are those that are not finite or too far from the
-        grid. They get NaN and -1.
+    Args:
+        mesh, points: what voxelize() takes, and positions (n, 3).
+        grid: whose lattice positions are snapped to.
+        sign, repair, bodies, max_hole_edges: as in distance(); repair is "none" or "close_holes".
+        threads: 0 takes all cores.
+        nearest: also returns the number of each point's nearest triangle, int64.
+        status: a dict that is filled with the call's counters; bad_points are those that are not finite or too far from the
+            grid. They get NaN and -1.
 
     Returns the distances, or (distances, nearest). A mesh of torch's tensors gives tensors.
+
+    Example:
+        >>> d = vp.distance_at(mesh, points, sign="unsigned")
     """
+    check_threads(threads)
+    check_status(status)
+    if grid is not None:
+        check_grid(grid, "distance_at")
     m = _host_mesh(mesh)
     at = m.take(points, "the array of points")
     if at.ndim != 2 or at.shape[1] != 3:
@@ -138,10 +159,10 @@ def distance_at(
     if at.dtype.kind not in "fiu":
         raise ValueError(f"points are numbers, not {at.dtype}")
     chosen = grid if grid is not None else fit(mesh, 1024)
-    positions, where = m.positions(chosen)
+    positions, where, reference = m.placed(chosen)
     with np.errstate(over="ignore", invalid="ignore"):
-        if positions is not m.vertices:  # relative to the grid's origin
-            at = at.astype(np.float64) - np.asarray(chosen._whole_origin)
+        if any(reference):
+            at = at.astype(np.float64) - np.asarray(reference)
         single = np.ascontiguousarray(at, np.float32)
     out = np.empty(len(at), np.float32)
     numbers = np.empty(len(at), np.int64)

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""Models given by path, and the files that they were read from: save() does not replace them."""
+"""The files that models were read from: save() does not replace them."""
 
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import Iterable
 
 # By device and inode: the paths that were read, absolute, and what messages call the file.
 _read: dict[tuple[int, int], dict[str, str]] = {}
@@ -19,23 +19,11 @@ def _note(path: str, what: str) -> None:
     _read.setdefault((found.st_dev, found.st_ino), {})[os.path.abspath(path)] = what
 
 
-def load(path: str) -> Any:
-    """A mesh of trimesh."""
-    try:
-        import trimesh
-    except ImportError:
-        raise ImportError("reading a model from a path needs trimesh: pip install trimesh") from None
-
-    class Noting(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
-        """Gives the files that the model names."""
-
-        def get(self, name: str) -> bytes:
-            data: bytes = super().get(name)
-            _note(os.path.join(self.parent, name.strip()), f"a file of {path!r}")
-            return data
-
+def note_model(path: str, named: Iterable[str]) -> None:
+    """A model is read, and the files that it names."""
     _note(path, f"the model {path!r}")
-    return trimesh.load_mesh(path, process=False, resolver=Noting(path))
+    for file in named:
+        _note(file, f"a file of {path!r}")
 
 
 def refuse_input(path: str) -> None:

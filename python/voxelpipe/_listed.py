@@ -8,7 +8,9 @@ from typing import Any, Mapping
 
 import numpy as np
 
-from ._mesh import to_numpy
+from ._arrays import to_numpy
+from ._axes import as_voxels
+from ._core import Grid
 
 
 def is_list(values: Any) -> bool:
@@ -35,13 +37,27 @@ def occupied_of(arrays: dict[str, np.ndarray], occupied: Any) -> np.ndarray:
     return np.asarray(np.logical_or.reduce(masks))
 
 
-def listed(values: Any, occupied: Any) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def check_shapes(values: Any, arrays: Mapping[str, np.ndarray], occupied: Any, grid: Grid) -> None:
+    """Raises ValueError for one of the dense arrays of `values` that does not have the grid's shape."""
+    shapes = {name if isinstance(values, Mapping) else "values": a.shape for name, a in arrays.items()}
+    if occupied is not None:
+        shapes["occupied"] = tuple(occupied.shape)
+    for name, shape in shapes.items():
+        if shape[:3] != grid.shape or len(shape) > 4 or (name == "occupied" and len(shape) != 3):
+            raise ValueError(f"{name} has the shape {shape}, the grid's is {grid.shape} (nz, ny, nx)")
+
+
+def listed(values: Any, occupied: Any, grid: Grid) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Voxels (n, 3) int32 with columns x, y, z, and a row for each of them by name."""
     if is_list(values):
-        voxels = np.ascontiguousarray(to_numpy(values[0], "voxels"), np.int32)
+        voxels = as_voxels(values[0], "voxels")
         rows = {name: to_numpy(a, name) for name, a in values[1].items()}
+        for name, a in rows.items():
+            if len(a) != len(voxels):
+                raise ValueError(f"{name} has {len(a)} rows for {len(voxels)} voxels")
     else:
         arrays = named(values)
+        check_shapes(values, arrays, occupied, grid)
         at = np.nonzero(occupied_of(arrays, occupied))
         voxels = np.ascontiguousarray(np.stack(at[::-1], axis=1), np.int32)
         rows = {name: a[at] for name, a in arrays.items()}

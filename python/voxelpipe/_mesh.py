@@ -10,12 +10,11 @@ from typing import Any, Callable, Sequence
 
 import numpy as np
 
+from ._arrays import is_on_device, is_torch, to_numpy, to_torch
 from ._core import Grid
-from ._device import DeviceMesh, as_device_mesh, is_on_device
-from ._inputs import load
-
-# Types that functions take as a mesh; see as_mesh.
-MeshLike = Any
+from ._device import DeviceMesh, as_device_mesh
+from ._model import Model, narrowed, read_scene
+from ._types import MeshLike
 
 
 @dataclass(frozen=True)
@@ -49,40 +48,39 @@ class Mesh:
         return vertices.min(axis=0).astype(np.float64).tolist(), vertices.max(axis=0).astype(np.float64).tolist()
 
     def positions(self, grid: Grid) -> tuple[np.ndarray, Grid]:
-        """Positions in float32, and the grid in which they are to be drawn.
+        """Positions in float32, and the grid in which they are to be drawn."""
+        positions, where, _ = self.placed(grid)
+        return positions, where
+
+    def placed(self, grid: Grid) -> tuple[np.ndarray, Grid, Sequence[float]]:
+        """The same, and the point that was taken away from both.
 
         Positions in double lose nothing but what lies beyond float32 after the grid's origin has been taken away.
         """
         if self.vertices.dtype == np.float32:
-            return self.vertices, grid
+            return self.vertices, grid, (0.0, 0.0, 0.0)
         with np.errstate(over="ignore", invalid="ignore"):
             relative = (self.vertices - np.asarray(grid._whole_origin)).astype(np.float32)
-        return np.ascontiguousarray(relative), grid._relative_to_origin()
+        return np.ascontiguousarray(relative), grid._relative_to_origin(), grid._whole_origin
 
 
-def to_numpy(a: Any, what: str) -> np.ndarray:
-    """An array of any library in host memory; shares its memory where it can."""
-    if isinstance(a, np.ndarray):
-        return a
-    if is_on_device(a):
-        raise TypeError(f"{what} is in a GPU's memory, the mesh is not: copy it to the host, as with .cpu() or .get()")
-    if hasattr(a, "detach"):  # a tensor of torch that records gradients
-        a = a.detach()
-    if hasattr(a, "__dlpack__") and not hasattr(a, "__array__"):
-        return np.from_dlpack(a)
-    return np.asarray(a)
+@dataclass(frozen=True)
+class ModelMesh(Mesh):
+    """A model, drawn by the positions that the tool draws."""
+
+    scene: Any  # _core.Scene
+
+    def placed(self, grid: Grid) -> tuple[np.ndarray, Grid, Sequence[float]]:
+        positions, where, reference = self.scene.positions(grid)
+        return positions, where, reference
 
 
-def _is_torch(a: Any) -> bool:
-    return type(a).__module__.split(".")[0] == "torch"
+def _as_it_is(a: np.ndarray) -> np.ndarray:
+    return a
 
 
 def _converter(a: Any) -> Callable[[np.ndarray], Any]:
-    if _is_torch(a):
-        import torch
-
-        return torch.from_numpy
-    return lambda array: array
+    return to_torch if is_torch(a) else _as_it_is
 
 
 def _vertices(a: Any) -> np.ndarray:
@@ -93,26 +91,22 @@ def _vertices(a: Any) -> np.ndarray:
         raise ValueError(f"vertices are numbers, not {v.dtype}")
     if v.dtype == np.float32:
         return np.ascontiguousarray(v)
-    v = v.astype(np.float64, copy=False)
-    with np.errstate(over="ignore"):
-        single = v.astype(np.float32)
-    if np.array_equal(single.astype(np.float64), v, equal_nan=True):
-        return np.ascontiguousarray(single)
-    return np.ascontiguousarray(v)
+    return narrowed(v.astype(np.float64, copy=False))
 
 
-def _triangles(a: Any) -> np.ndarray:
+def _triangles(a: Any, num_vertices: int, part: str) -> np.ndarray:
+    """Raises IndexError that names the first triangle with a vertex that does not exist. `part`: of a list, or empty."""
     t = to_numpy(a, "the array of triangles")
     if t.ndim != 2 or t.shape[1] != 3:
         raise ValueError(f"triangles are an array (f, 3) of vertex numbers, not {t.shape}")
     if t.dtype.kind not in "iu":
         raise ValueError(f"triangles are integers, not {t.dtype}")
-    if t.dtype in (np.uint32, np.int32):  # a negative number becomes one that no mesh has
+    if t.size and (int(t.max()) >= num_vertices or int(t.min()) < 0):
+        row = int(np.argmax(((t < 0) | (t >= num_vertices)).any(axis=1)))
+        numbers = ", ".join(str(int(i)) for i in t[row])
+        raise IndexError(f"triangle {row}{part} is ({numbers}), the mesh has {num_vertices} vertices")
+    if t.dtype in (np.uint32, np.int32):
         return np.ascontiguousarray(t).view(np.uint32)
-    bad = (t < 0) | (t > np.iinfo(np.uint32).max)
-    if bad.any():
-        row = int(np.argmax(bad.any(axis=1)))
-        raise IndexError(f"triangle {row} names a vertex that does not exist: {tuple(int(i) for i in t[row])}")
     return np.ascontiguousarray(t, dtype=np.uint32)
 
 
@@ -124,7 +118,7 @@ def _pyvista(mesh: Any) -> tuple[Any, Any]:
 def _parts_of(mesh: MeshLike) -> tuple[Any, Any]:
     """(vertices, triangles) of one mesh, as the caller's arrays."""
     if isinstance(mesh, (str, os.PathLike)):
-        return _parts_of(load(os.fspath(mesh)))
+        return _parts_of(Model(os.fspath(mesh), read_scene(os.fspath(mesh), False, 4)))
     if isinstance(mesh, tuple) and len(mesh) == 2:
         return mesh
     if hasattr(mesh, "geometry") and hasattr(mesh, "graph"):  # a scene of trimesh
@@ -143,26 +137,37 @@ def _parts_of(mesh: MeshLike) -> tuple[Any, Any]:
     )
 
 
+def _model_mesh(model: Model) -> ModelMesh:
+    triangles = model._scene.triangles
+    firsts = tuple(p.first_triangle for p in model.parts if p.num_triangles) or (0,)
+    return ModelMesh(model.vertices, triangles, firsts, _as_it_is, model._scene)
+
+
 def as_mesh(mesh: MeshLike) -> Mesh | DeviceMesh:
-    """Converts what the caller has. The parts of a list stay apart as bodies of solids, and are one mesh otherwise. Arrays
-    in a GPU's memory stay there."""
-    parts: Sequence[MeshLike] = mesh if isinstance(mesh, list) else [mesh]
+    """Converts what the caller has. The parts of a list, or of a model, stay apart as bodies of solids, and are one mesh
+    otherwise. Arrays in a GPU's memory stay there."""
+    parts: Sequence[Any] = mesh if isinstance(mesh, list) else [mesh]
+    if len(parts) == 1:
+        only = parts[0]
+        if isinstance(only, (str, os.PathLike)):
+            only = Model(os.fspath(only), read_scene(os.fspath(only), False, 3))
+        if isinstance(only, Model):
+            return _model_mesh(only)
     pairs = [_parts_of(part) for part in parts]
     if any(is_on_device(a) for pair in pairs for a in pair):
         return as_device_mesh(pairs)
+    if not pairs:
+        return Mesh(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32), (0,), _as_it_is)
     vertices = [_vertices(v) for v, _ in pairs]
-    triangles = [_triangles(t) for _, t in pairs]
-    to_caller = _converter(pairs[0][0]) if pairs else lambda array: array
+    triangles = [
+        _triangles(t, len(v), f" of part {i}" if len(pairs) > 1 else "")
+        for i, ((_, t), v) in enumerate(zip(pairs, vertices))
+    ]
+    to_caller = _converter(pairs[0][0])
     if len(pairs) == 1:
         return Mesh(vertices[0], triangles[0], (0,), to_caller)
-    if not pairs:
-        return Mesh(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32), (0,), to_caller)
     if any(v.dtype == np.float64 for v in vertices):
         vertices = [v.astype(np.float64) for v in vertices]
-    for v, t in zip(vertices, triangles):  # joined, a bad number might name a vertex of another part
-        bad = (t >= len(v)).any(axis=1)
-        if bad.any():
-            raise IndexError(f"triangle {int(np.argmax(bad))} of a part names a vertex that does not exist")
     first_vertex = np.cumsum([0] + [len(v) for v in vertices[:-1]])
     joined = np.concatenate([t + np.uint32(first) for t, first in zip(triangles, first_vertex)])
     first_triangle = np.cumsum([0] + [len(t) for t in triangles[:-1]])

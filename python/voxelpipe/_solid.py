@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _core, _device
 from ._core import Grid
 from ._device import DeviceMesh
-from ._mesh import MeshLike, as_mesh
-from ._surface import take_counts
+from ._mesh import Mesh, as_mesh
+from ._surface import listed_for, take_counts, words_for
+from ._types import (
+    Bodies,
+    Extent,
+    Fill,
+    MeshLike,
+    Repair,
+    TensorMesh,
+    check_call,
+    check_choice,
+    whole_number,
+)
 
 
 class OpenMeshWarning(UserWarning):
@@ -65,58 +77,166 @@ def _advice(draw: Any, m: Any, grid: Grid, repair: str, bodies: str, threads: in
     return "; tried on it: " + ", and ".join(helps) if helps else "; no repair that was tried helps"
 
 
+def check_options(fill: Any, extent: Any, repair: Any, bodies: Any, max_hole_edges: Any, closing: Any) -> None:
+    """Raises ValueError or TypeError that names the argument."""
+    check_choice("fill", fill, Fill)
+    check_choice("extent", extent, Extent)
+    check_choice("repair", repair, Repair)
+    check_choice("bodies", bodies, Bodies)
+    if max_hole_edges is not None:
+        whole_number("max_hole_edges", max_hole_edges)
+    whole_number("closing", closing)
+
+
+def solid_voxels(m: Any, grid: Grid, options: Any, as_tiles: bool,
+                 threads: int) -> tuple[np.ndarray, np.ndarray, dict[str, int]]:  # fmt: skip
+    """Voxels, tiles (see tiles()) and counters of a solid. options: fill, extent, repair, bodies, max_hole_edges, closing."""
+    if isinstance(m, DeviceMesh):
+        raise TypeError("solids as lists are drawn on the CPU: copy the mesh to the host, as with .cpu() or .get()")
+    check_options(*options)
+    positions, where = m.positions(grid)
+    voxels, tiles, counts = _core.solid_list(
+        positions, m.triangles, list(m.first_triangles), where, *options, as_tiles, threads
+    )
+    if counts["open_rows"] and options[2] in ("none", "close_holes"):
+        warnings.warn(
+            f"the mesh is not closed: {counts['open_rows']} rows of voxels do not balance, and what lies behind a hole is in "
+            "doubt; solid() tells which repairs help",
+            OpenMeshWarning,
+            stacklevel=3,
+        )
+    return voxels, tiles, counts
+
+
+@overload
+def solid(
+    mesh: TensorMesh,
+    grid: Grid,
+    fill: Fill = "nonzero",
+    *,
+    extent: Extent = "outer",
+    repair: Repair = "none",
+    bodies: Bodies = "all",
+    max_hole_edges: int | None = None,
+    closing: int = 0,
+    packed: bool = False,
+    threads: int = 0,
+    diagnose: bool = True,
+    status: dict[str, int] | None = None,
+) -> Any: ...
+
+
+@overload
 def solid(
     mesh: MeshLike,
     grid: Grid,
-    fill: str = "nonzero",
+    fill: Fill = "nonzero",
     *,
-    extent: str = "outer",
-    repair: str = "none",
-    bodies: str = "all",
+    extent: Extent = "outer",
+    repair: Repair = "none",
+    bodies: Bodies = "all",
     max_hole_edges: int | None = None,
     closing: int = 0,
+    packed: Literal[False] = False,
+    threads: int = 0,
+    diagnose: bool = True,
+    status: dict[str, int] | None = None,
+) -> npt.NDArray[np.bool_]: ...
+
+
+@overload
+def solid(
+    mesh: MeshLike,
+    grid: Grid,
+    fill: Fill = "nonzero",
+    *,
+    extent: Extent = "outer",
+    repair: Repair = "none",
+    bodies: Bodies = "all",
+    max_hole_edges: int | None = None,
+    closing: int = 0,
+    packed: Literal[True],
+    threads: int = 0,
+    diagnose: bool = True,
+    status: dict[str, int] | None = None,
+) -> npt.NDArray[np.uint32]: ...
+
+
+def solid(
+    mesh: MeshLike,
+    grid: Grid,
+    fill: Fill = "nonzero",
+    *,
+    extent: Extent = "outer",
+    repair: Repair = "none",
+    bodies: Bodies = "all",
+    max_hole_edges: int | None = None,
+    closing: int = 0,
+    packed: bool = False,
     threads: int = 0,
     diagnose: bool = True,
     status: dict[str, int] | None = None,
 ) -> Any:
     """The inside of closed meshes, exactly: bool, (nz, ny, nx).
 
-    fill: what the winding number w of a point says. "nonzero": inside where w != 0, so overlapping parts stay solid and
-        inverted shells are cavities. "even_odd": inside where w is odd. "positive": inside where w > 0.
-    extent: "outer", the voxels whose centre is inside, and those that a triangle touches; "centre", the former alone;
-        "inner", those whose centre is inside and that no triangle touches.
-    repair: "none"; "close_holes" puts a cone over each hole's boundary; "exterior" takes for inside what a flood from
-        outside does not reach (fills cavities, no crops); "vote" takes the majority of rows along x, y and z. The last
-        two have an inside of their own: another fill or extent than the default is a ValueError.
-    bodies: "all", the meshes of a list together; "each", every mesh of a list by itself.
-    max_hole_edges: for close_holes, holes with more edges stay open.
-    closing: for exterior, gaps of up to about twice as many voxels are closed, 0 to 64.
-    diagnose: whether an open mesh is examined, which takes some twenty bits a voxel and several times as long. For
-        exterior: what its flood took. Otherwise, where rows prove that the mesh is open: which repairs help. Only those
-        that were tried on this mesh and grid are named.
-    status: a dict that is filled with the call's counters, among them open_rows, crossings and holes. For exterior also
-        lost_voxels, which closed rows along x, y and z have inside and the flood took; enclosed_voxels, which it left and
-        no triangle touches; where voxels are lost face_voxels, which it would not take in a grid that holds the mesh,
-        entered_holes, by which it came in, the hole_width of the widest of
-        them in voxels, the least tried_closing that keeps the voxels (0: none), and tried_close_holes, 1 if that
-        does.
+    The default extent is "outer", as in the voxelize tool: the inside and all that the surface touches, which is half a
+    voxel too much all around. For a volume take extent="centre", which is the default of the C++ library.
+
+    Args:
+        mesh: what voxelize() takes. The meshes of a list, and the parts of a model, are bodies.
+        grid: the Grid.
+        fill: what the winding number w of a point says. "nonzero": inside where w != 0, so overlapping parts stay solid
+            and inverted shells are cavities. "even_odd": inside where w is odd. "positive": inside where w > 0.
+        extent: "outer", the voxels whose centre is inside, and those that a triangle touches; "centre" (or "center"), the
+            former alone; "inner", those whose centre is inside and that no triangle touches.
+        repair: "none"; "close_holes" puts a cone over each hole's boundary; "exterior" takes for inside what a flood from
+            outside does not reach (fills cavities, no crops); "vote" takes the majority of rows along x, y and z. The last
+            two have an inside of their own: another fill or extent than the default is a ValueError.
+        bodies: "all", the meshes of a list together; "each", every one by itself.
+        max_hole_edges: for close_holes, holes with more edges stay open.
+        closing: for exterior, gaps of up to about twice as many voxels are closed, 0 to 64.
+        packed: uint32 (nz, ny, ceil(nx / 32)) in place of bool, a bit for each voxel, lowest bit first: an eighth of the
+            memory. int32 for torch, the same bits. On the CPU only.
+        threads: 0 takes all cores. The result is the same for any number.
+        diagnose: whether an open mesh is examined, which takes some twenty bits a voxel and several times as long. For
+            exterior: what its flood took. Otherwise, where rows prove that the mesh is open: which repairs help. Only
+            those that were tried on this mesh and grid are named.
+        status: a dict that is filled with the call's counters, among them open_rows, crossings and holes. For exterior
+            also lost_voxels, which closed rows along x, y and z have inside and the flood took; enclosed_voxels, which it
+            left and no triangle touches; where voxels are lost face_voxels, which it would not take in a grid that holds
+            the mesh, entered_holes, by which it came in, the hole_width of the widest of them in voxels, the least
+            tried_closing that keeps the voxels (0: none), and tried_close_holes, 1 if that does.
+
+    Returns:
+        An array, indexed [z, y, x]; of a mesh of torch's tensors a tensor. sparse(mesh, grid, solid="nonzero") is a list
+        in its place.
 
     Warns with OpenMeshWarning where rows of voxels prove that the mesh is not closed, and where a flood took voxels of the
     inside. With exterior, a mesh that leaves the grid is flooded there, and a grid that lies within the mesh is a
     ValueError: the set would not be the crop of the whole's.
+
+    Example:
+        >>> inside = vp.solid(mesh, grid, extent="centre")
+        >>> volume = inside.sum() * np.prod(grid.voxel_size)
     """
+    check_call("solid", grid, "conservative", threads, status)
+    check_options(fill, extent, repair, bodies, max_hole_edges, closing)
     m = as_mesh(mesh)
+    if packed and isinstance(m, DeviceMesh):
+        raise TypeError("packed solids are drawn on the CPU: copy the mesh to the host, as with .cpu() or .get()")
 
     def draw(repair: str, max_hole_edges: int | None = None) -> tuple[Any, dict[str, int]]:
         options = (fill, extent, repair, bodies, max_hole_edges, closing)
         if isinstance(m, DeviceMesh):
             return _device.solid(m, grid, options)
         positions, where = m.positions(grid)
-        out = np.empty(grid.shape, np.uint8)
-        counts = _core.solid_mask(
-            positions, m.triangles, list(m.first_triangles), where, *options, out, threads
+        nz, ny, nx = grid.shape
+        words = np.empty((nz, ny, (nx + 31) // 32), np.uint32) if packed else None
+        mask = None if packed else np.empty(grid.shape, np.uint8)
+        counts = _core.solid_dense(
+            positions, m.triangles, list(m.first_triangles), where, *options, mask, words, threads
         )
-        return m.to_caller(out.view(np.bool_)), counts
+        return words_for(m, words) if words is not None else m.to_caller(mask.view(np.bool_)), counts
 
     result, counts = draw(repair, max_hole_edges)
     flood = {}
@@ -145,3 +265,39 @@ def solid(
             stacklevel=2,
         )
     return result
+
+
+def tiles(
+    mesh: MeshLike,
+    grid: Grid,
+    fill: Fill = "nonzero",
+    *,
+    extent: Extent = "outer",
+    repair: Repair = "none",
+    bodies: Bodies = "all",
+    max_hole_edges: int | None = None,
+    closing: int = 0,
+    threads: int = 0,
+    status: dict[str, int] | None = None,
+) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
+    """The inside of closed meshes as voxels and cubes of voxels: memory in proportion to the surface, where a list has all
+    voxels of the inside.
+
+    Args:
+        mesh, grid, fill, extent, repair, bodies, max_hole_edges, closing, threads, status: as in solid().
+
+    Returns:
+        Voxels and cubes. The voxels are a VoxelList (n, 3) int32, columns x, y, z. The cubes are (m, 4) int32, the first
+        voxel of each (x, y, z) and its side, 8, 16, 32 and so on; all of its voxels are inside, and none is in the list.
+
+    Example:
+        >>> voxels, cubes = vp.tiles(mesh, vp.fit(mesh, 4096))
+        >>> number = len(voxels) + (cubes[:, 3].astype(np.int64) ** 3).sum()
+    """
+    check_call("tiles", grid, "conservative", threads, status)
+    m = as_mesh(mesh)
+    options = (fill, extent, repair, bodies, max_hole_edges, closing)
+    voxels, cubes, counts = solid_voxels(m, grid, options, True, threads)
+    take_counts(counts, status)
+    assert isinstance(m, Mesh)
+    return listed_for(m, voxels), m.to_caller(cubes)

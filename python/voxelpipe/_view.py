@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ._core import Grid
+from ._types import Up, check_choice, check_grid
 from ._inputs import refuse_input
 from ._listed import listed
 
@@ -47,17 +48,27 @@ def _page_values(a: np.ndarray) -> tuple[str, np.ndarray]:
     return kinds[a.dtype.name], a
 
 
-def view(values: Any, grid: Grid, *, occupied: Any = None, up: str = "y", name: str = "voxels") -> View:
+def view(values: Any, grid: Grid, *, occupied: Any = None, up: Up = "y", name: str = "voxels") -> View:
     """A page that shows voxels in a browser and in a notebook, without a network: turned by mouse, fingers and keys, cut along
     an axis, with a list of the values.
 
-    values: an array (nz, ny, nx) or (nz, ny, nx, columns), a dict of arrays, or what sparse() returned. Three or four columns of
-    uint8 are colours, three of floats directions; other numbers are shown by a colour map. occupied: the voxels to show, bool; by
-    default those whose value is not zero. up: the axis that stands upright.
+    Args:
+        values: an array (nz, ny, nx) or (nz, ny, nx, columns), a dict of arrays, or what sparse() returned. Three or four
+            columns of uint8 are colours, three of floats directions; other numbers are shown by a colour map.
+        grid: the Grid of the values.
+        occupied: the voxels to show, bool; by default those whose value is not zero.
+        up: the axis that stands upright.
+        name: the page's title.
+
+    Returns:
+        A View, which a notebook shows; save(path) writes it.
+
+    Example:
+        >>> vp.view(vp.bake("lighthouse.glb", grid), grid)
     """
-    if up not in ("y", "z"):
-        raise ValueError(f"up is 'y' or 'z', not {up!r}")
-    voxels, rows = listed(values, occupied)
+    check_choice("up", up, Up)
+    check_grid(grid, "view")
+    voxels, rows = listed(values, occupied, grid)
     key = sum(_spread(voxels[:, axis].astype(np.int64)) << axis for axis in range(3))
     order = np.argsort(key, kind="stable")
     key = np.asarray(key)[order]

@@ -16,6 +16,7 @@ namespace vp = voxelpipe;
 struct surface { // a target's value: any trivially copyable struct
     float distance;
     std::uint32_t material;
+    bool operator==(const surface&) const = default; // for_each_occupied compares it with the empty one
 };
 
 struct nearest {
@@ -64,8 +65,12 @@ int main() {
     // end snippet
 
     const surface near = vp::get<0>(picture).to_host_target(backend)(1, 1, 0);
+    int occupied = 0;
+    vp::for_each_occupied(vp::get<0>(picture).to_host_target(backend),
+                          [&](const glm::ivec3&, const surface&) { ++occupied; });
     const glm::vec2 mixed = vp::get<1>(picture).to_host_target(backend)(1, 1, 0);
-    const bool good = near.distance == 1 && near.material == 0 && mixed.x == 0.75f * 0.5f + 0.5f && mixed.y == 0.625f;
+    const bool good = occupied != 0 && near.distance == 1 && near.material == 0 && mixed.x == 0.75f * 0.5f + 0.5f &&
+                      mixed.y == 0.625f;
     std::printf("nearest %u, composited %g with opacity %g\n", near.material, static_cast<double>(mixed.x),
                 static_cast<double>(mixed.y));
     return good ? 0 : 1;

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <optional>
 
 using gltf_test::builder;
 using gltf_test::json;
@@ -501,6 +502,69 @@ TEST(GltfScene, WhatIsLeftOutIsNamed) {
     for (const char* part : {"1 animation(s)", "KHR_materials_sheen", "ACME_secret"})
         EXPECT_TRUE(warns(scene, part)) << part;
     EXPECT_EQ(3U, scene.warnings.size());
+}
+
+// Two triangles; the variant "night" gives the first another material, "day" none.
+builder varied() {
+    builder file;
+    for (int m = 0; m < 3; ++m) file.append("materials", {{"name", "m" + std::to_string(m)}});
+    file.root["extensionsUsed"] = {"KHR_materials_variants"};
+    file.root["extensionsRequired"] = {"KHR_materials_variants"};
+    file.root["extensions"]["KHR_materials_variants"]["variants"] = {{{"name", "day"}}, {{"name", "night"}}};
+    json& first = file.triangle();
+    first["material"] = 0;
+    first["extensions"]["KHR_materials_variants"]["mappings"] = {{{"variants", {0}}, {"material", 1}},
+                                                                 {{"variants", {1}}, {"material", 2}}};
+    file.triangle()["extensions"]["KHR_materials_variants"]["mappings"] = {{{"variants", {0}}, {"material", 2}}};
+    return file;
+}
+
+std::vector<std::uint32_t> materials_of(const builder& file, std::optional<std::string> variant) {
+    voxelize::gltf_options options;
+    options.variant = std::move(variant);
+    const scene made = voxelize::load_gltf(file.glb(), {}, {}, options);
+    std::vector<std::uint32_t> materials;
+    for (const voxelize::instance& shown : made.instances)
+        materials.push_back(made.primitives[shown.primitive].material);
+    if (!options.variant) {
+        EXPECT_TRUE(warns(made, "the file has 2 material variant(s), \"day\", \"night\": surfaces have their own"));
+    } else {
+        EXPECT_TRUE(made.warnings.empty());
+    }
+    return materials;
+}
+
+TEST(GltfScene, VariantsGiveOtherMaterials) {
+    using numbers = std::vector<std::uint32_t>;
+    const builder file = varied();
+    EXPECT_EQ((numbers{0, 3}), materials_of(file, std::nullopt)); // 3: the default material
+    EXPECT_EQ((numbers{1, 2}), materials_of(file, "day"));
+    EXPECT_EQ((numbers{2, 3}), materials_of(file, "night"));
+}
+
+TEST(GltfScene, VariantsThatAreNotThereAreErrors) {
+    const auto error_of = [](const builder& file, const char* variant) -> std::string {
+        voxelize::gltf_options options;
+        options.variant = variant;
+        try {
+            (void)voxelize::load_gltf(file.glb(), {}, {}, options);
+        } catch (const voxelize::gltf_error& error) {
+            return error.what();
+        }
+        return "";
+    };
+    builder file = varied();
+    EXPECT_EQ("there is no material variant \"dusk\"; the file has \"day\", \"night\"", error_of(file, "dusk"));
+    builder none;
+    none.triangle();
+    EXPECT_EQ("there is no material variant \"day\", the file has none", error_of(none, "day"));
+    json& mapping = file.root["meshes"][0]["primitives"][0]["extensions"]["KHR_materials_variants"]["mappings"][1];
+    const std::string where = "meshes[0].primitives[0].extensions.KHR_materials_variants.mappings[1]";
+    mapping["variants"] = {2};
+    EXPECT_EQ(where + ".variants[0]: 2 is not in variants, which has 2", error_of(file, "day"));
+    mapping["variants"] = {1};
+    mapping["material"] = 9;
+    EXPECT_EQ(where + ".material: 9 is not in materials, which has 3", error_of(file, "day"));
 }
 
 TEST(GltfScene, PositionsThatAreNotFiniteAreCounted) {

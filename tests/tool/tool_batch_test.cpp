@@ -304,4 +304,32 @@ TEST(ToolBatch, ChecksItsOptions) {
     EXPECT_EQ("voxelize: cannot read the list '" + folder.path().string() + "': it is a folder\n", a_folder.err);
 }
 
+TEST(ToolBatch, PagesAreShownSideBySide) {
+    models all;
+    all.add("m/one.obj");
+    all.add("m/two & three.obj", 2);
+    all.write_list();
+    const std::vector<std::string> pages{
+        "--list", all.folder / "models.txt", "-o", all.folder / "o/{name}/p.html", "-r", "16"};
+    ASSERT_EQ(0, run(all.folder, pages).code);
+    const std::string page = read_file(all.folder / "o/side_by_side.html");
+    EXPECT_NE(
+        page.find(R"("pages":[{"name":"one","file":"one/p.html"},{"name":"two & three","file":"two & three/p.html"}])"),
+        std::string::npos);
+    EXPECT_TRUE(fs::exists(all.folder / "o/two & three/p.html"));
+
+    // Another rank leaves it to the first, and no model takes its place.
+    fs::remove(all.folder / "o/side_by_side.html");
+    std::vector<std::string> second = pages;
+    second.insert(second.end(), {"--rank", "1", "--world-size", "2"});
+    ASSERT_EQ(0, run(all.folder, second).code);
+    EXPECT_FALSE(fs::exists(all.folder / "o/side_by_side.html"));
+    all.add("m/side_by_side.obj");
+    all.write_list();
+    const outcome taken =
+        run(all.folder, {"--list", all.folder / "models.txt", "-o", all.folder / "o/{name}.html", "-r", "16"});
+    EXPECT_EQ(1, taken.code);
+    EXPECT_NE(taken.err.find("side_by_side.html"), std::string::npos) << taken.err;
+}
+
 } // namespace

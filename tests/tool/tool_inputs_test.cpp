@@ -96,6 +96,28 @@ TEST(ToolInputs, ScaleIsOfAllFormats) {
         EXPECT_EQ(1, run(folder, {folder / "m.glb", "-o", folder / "o.npy", "--scale", wrong}).code) << wrong;
 }
 
+TEST(ToolInputs, VariantsChooseMaterials) {
+    const scratch_folder folder;
+    builder file;
+    for (const double red : {0.0, 1.0}) (void)gltf_test::add_material(file, {red, 0, 0, 1});
+    file.root["extensions"]["KHR_materials_variants"]["variants"] = {{{"name", "red"}}};
+    json& square = gltf_test::add_square(file, 0);
+    square["material"] = 0;
+    square["extensions"]["KHR_materials_variants"]["mappings"] = {{{"variants", {0}}, {"material", 1}}};
+    const std::string model = folder / "m.glb";
+    file.write_glb(model);
+    const outcome red = run(folder, {model, "-o", folder / "o.npy", "-s", "1", "-t", "material", "--variant", "red"});
+    EXPECT_EQ("", red.err);
+    EXPECT_EQ(1, tool_test::read_npy(folder / "o.npy").at<std::int32_t>(0));
+    const outcome away = run(folder, {model, "-o", folder / "o.npy", "--variant", "blue"});
+    EXPECT_EQ(2, away.code);
+    EXPECT_EQ("voxelize: " + model + ": there is no material variant \"blue\"; the file has \"red\"\n", away.err);
+    std::ofstream(folder / "box.obj") << box_obj();
+    const outcome other = run(folder, {folder / "box.obj", "-o", folder / "o.npy", "--variant", "red"});
+    EXPECT_EQ(2, other.code);
+    EXPECT_NE(std::string::npos, other.err.find("--variant is for glTF models")) << other.err;
+}
+
 TEST(ToolInputs, AnimationsPoseTheModel) {
     const scratch_folder folder;
     builder file;

@@ -47,13 +47,13 @@ TEST(Messages, AnOptionOfOneValueThatIsGivenTwiceSaysSo) {
         return result.err.substr(0, result.err.find('\n'));
     };
     const std::vector<std::pair<std::string, std::string>> options{
-        {"--resolution", "8"},    {"--padding", "1"},     {"--voxel-size", "1"},       {"--origin", "0,0,0"},
-        {"--extent", "4,4,4"},    {"--scale", "2"},       {"--coverage", "thin"},      {"--alpha", "cutoff"},
-        {"--depth-axis", "x"},    {"--solid", "nonzero"}, {"--solid-extent", "outer"}, {"--closing", "1"},
-        {"--fill-color", "mean"}, {"--backend", "cpu"},   {"--strategy", "tiled"},     {"--devices", "1"},
-        {"--threads", "1"},       {"--max-memory", "99"}, {"--work-memory", "99"},     {"--image-size", "9x9"},
-        {"--azimuth", "1"},       {"--zoom", "1"},        {"--background", "sky"},     {"--up", "y"},
-        {"--compression", "1"},   {"--stats", "json"},    {"--zarr-codec", "gzip"},    {"--list", "l.txt"}};
+        {"--resolution", "8"},  {"--padding", "1"},     {"--voxel-size", "1"},       {"--origin", "0,0,0"},
+        {"--extent", "4,4,4"},  {"--scale", "2"},       {"--coverage", "thin"},      {"--alpha", "cutoff"},
+        {"--depth-axis", "x"},  {"--solid", "nonzero"}, {"--solid-extent", "outer"}, {"--closing", "1"},
+        {"--fill", "mean"},     {"--backend", "cpu"},   {"--strategy", "tiled"},     {"--devices", "1"},
+        {"--threads", "1"},     {"--max-memory", "99"}, {"--work-memory", "99"},     {"--image-size", "9x9"},
+        {"--azimuth", "1"},     {"--zoom", "1"},        {"--background", "sky"},     {"--up", "y"},
+        {"--compression", "1"}, {"--stats", "json"},    {"--zarr-codec", "gzip"},    {"--list", "l.txt"}};
     for (const auto& [option, value] : options)
         EXPECT_EQ("voxelize: " + option + " is given twice; it takes one value", error({option, value, option, value}));
     EXPECT_EQ("voxelize: --resolution is given twice; it takes one value", error({"-r", "8", "-r", "16"}));
@@ -139,9 +139,17 @@ TEST(Messages, TargetsThatNoOutputHoldsAreAWarning) {
     EXPECT_EQ("", warnings({"-t", "color", "-o", folder / "a.binvox", "-o", folder / "a.npy"}));
     EXPECT_EQ("", warnings({"-t", "color", "-o", folder / "a.vox"}));
     EXPECT_EQ("", warnings({"-o", folder / "a.binvox"}));
-    const std::string depth = warnings({"-t", "depth,occupancy", "-o", folder / "a.png"});
+    const std::string depth = warnings({"-t", "depth,occupancy", "-o", folder / "a.vox"});
     EXPECT_EQ(1, lines_of(depth)) << depth;
     EXPECT_NE(std::string::npos, depth.find("--target depth")) << depth;
+    // A picture shows colours, or else the first of the other values.
+    EXPECT_EQ("", warnings({"-t", "occupancy,depth", "-o", folder / "a.png"}));
+    for (const char* targets : {"count,depth", "color,depth"}) {
+        const std::string second = warnings({"-t", targets, "-o", folder / "a.png"});
+        EXPECT_EQ(1, lines_of(second)) << second;
+        EXPECT_NE(std::string::npos, second.find("--target depth")) << second;
+    }
+    EXPECT_EQ(1, lines_of(warnings({"-t", "depth", "--no-color", "-o", folder / "a.png"})));
 }
 
 TEST(Messages, ExtensionsOfTheSameKindAreOneWarning) {

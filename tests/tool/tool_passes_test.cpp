@@ -56,7 +56,7 @@ TEST(ToolPasses, ALaterProcessRepeatsNone) {
 TEST(ToolPasses, PiecesThatCutBricks) {
     const std::vector<std::string> kinds[] = {
         {"-t", "color-outer"},
-        {"-t", "color", "--solid", "nonzero"},
+        {"-t", "color", "--solid", "nonzero", "--fill", "mean"},
         {"-t", "occupancy", "--solid", "exterior"},
         {"-t", "occupancy", "--solid", "exterior", "--closing", "9", "--padding", "2"},
     };

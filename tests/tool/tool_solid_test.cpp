@@ -156,7 +156,7 @@ TEST(Solid, ValuesInside) {
         for (const char* rule : {"nonzero", "each_draw"}) {
             const outcome result =
                 run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-s", "1", "--solid", rule, "--solid-extent",
-                             extent, "--work-memory", "1", "-t",
+                             extent, "--work-memory", "1", "--fill", "mean", "-t",
                              "occupancy,count,color,color-max,color-outer,normal,material,triangle,depth"});
             ASSERT_EQ(0, result.code) << result.err;
             const auto read = [&folder](const char* name) {
@@ -336,7 +336,8 @@ TEST(Solid, WhatDoesNotGoTogetherIsAUsageError) {
     expect({"--solid", "nonzero", "--coverage", "conservative"}, "--solid and --coverage do not go together");
     expect({"--solid", "full"}, "--solid takes nonzero, even_odd, positive, each_draw or exterior, not \"full\"");
     expect({"--solid-extent", "outer"}, "--solid-extent goes with --solid");
-    expect({"--fill-color", "mean"}, "--fill-color goes with --solid");
+    expect({"--fill-color", "mean"}, "--fill goes with --solid");
+    expect({"--fill", "body"}, "--fill goes with --solid");
     expect({"--vote"}, "--vote goes with --solid");
     expect({"--close-holes"}, "--close-holes goes with --solid");
     expect({"--closing", "1"}, "--closing goes with --solid");
@@ -350,7 +351,7 @@ TEST(Solid, WhatDoesNotGoTogetherIsAUsageError) {
     expect({"--solid", "nonzero", "--close-holes=many"}, "--close-holes takes the number of edges");
     expect({"--solid", "exterior", "--solid-extent", "centre"}, "--solid exterior always has --solid-extent outer");
     expect({"--solid", "even_odd", "--vote", "--solid-extent", "inner"}, "--vote always has --solid-extent outer");
-    expect({"--solid", "nonzero", "--fill-color", "blue"}, "--fill-color takes mean or #rrggbb");
+    expect({"--solid", "nonzero", "--fill-color", "blue"}, "--fill takes body, nearest, mean or #rrggbb");
 }
 
 TEST(Solid, NothingInsideIsSaid) {

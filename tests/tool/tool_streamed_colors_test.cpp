@@ -70,11 +70,19 @@ TEST(StreamedColors, MeansFillSolids) {
     if (sanitized) return;
     const scratch_folder folder;
     write_balls(folder / "m.ply", 230);
-    two_ways{folder, folder / "m.ply", {"-r", "60", "-t", colors, "--solid", "nonzero"}}.expect_equal(60);
-    two_ways{folder,
-             folder / "m.ply",
-             {"-r", "60", "-t", "color,count", "--solid", "exterior", "--closing", "1", "--padding", "3"}}
+    two_ways{folder, folder / "m.ply", {"-r", "60", "-t", colors, "--solid", "nonzero", "--fill", "mean"}}.expect_equal(
+        60);
+    two_ways{
+        folder,
+        folder / "m.ply",
+        {"-r", "60", "-t", "color,count", "--solid", "exterior", "--closing", "1", "--padding", "3", "--fill", "mean"}}
         .expect_equal(60);
+    // The balls are bodies of one draw, which a stream does not tell apart.
+    const outcome bodies =
+        two_ways{folder, folder / "m.ply", {"-r", "60", "-t", "color", "--solid", "nonzero", "--max-memory", "60"}}
+            .draw("o.npz");
+    EXPECT_EQ(3, bodies.code);
+    EXPECT_NE(std::string::npos, bodies.err.find("--fill body needs the connected parts")) << bodies.err;
 }
 
 // Holes that a mask cuts let sides see what lies behind, and a sheet that blends.
@@ -131,7 +139,7 @@ TEST(StreamedColors, SharedSlabs) {
     gltf_test::lined_world().write_glb(folder / "m.glb");
     expect_same_pieces({folder, folder / "m.glb", {"-r", "60", "-t", colors}}, {});
     write_balls(folder / "m.ply", 230);
-    expect_same_pieces({folder, folder / "m.ply", {"-r", "60", "-t", colors, "--solid", "nonzero"}},
+    expect_same_pieces({folder, folder / "m.ply", {"-r", "60", "-t", colors, "--solid", "nonzero", "--fill", "mean"}},
                        {"--max-memory", "60"});
 }
 

@@ -134,11 +134,17 @@ TEST(StreamedSolids, PartsOfGltf) {
     const scratch_folder folder;
     builder file;
     gltf_test::add_two_parts(file, 580);
+    for (int p = 0; p < 2; ++p)
+        file.root["meshes"][0]["primitives"][static_cast<std::size_t>(p)]["material"] =
+            gltf_test::add_material(file, {p == 0 ? 1.0 : 0.0, 0.0, 1.0, 1.0});
     file.write_glb(folder / "m.glb");
     two_ways{folder,
              folder / "m.glb",
-             {"-r", "64", "-t", "occupancy,color", "--fill-color", "#102030", "--solid", "exterior", "--closing", "3"}}
-        .expect_equal(44);
+             {"-r", "64", "-t", "occupancy,color,material", "--solid", "exterior", "--closing", "3"}}
+        .expect_equal(60);
+    // Each body's own holes are closed.
+    two_ways{folder, folder / "m.glb", {"-r", "64", "-t", "color,material", "--solid", "nonzero", "--close-holes"}}
+        .expect_equal(60);
     two_ways{folder, folder / "m.glb", {"-r", "64", "-t", "count,triangle", "--solid", "nonzero", "--vote"}}
         .expect_equal(44);
 }
@@ -151,7 +157,7 @@ TEST(StreamedSolids, TilesAndSharedSlabs) {
     const std::vector<std::string> little{"--max-memory", "60"};
     const std::vector<std::string> rules[] = {{"exterior", "--closing", "2"}, {"nonzero", "--vote"}};
     for (const std::vector<std::string>& rule : rules) {
-        std::vector<std::string> how{"-r", "60", "--fill-color", "#102030", "--solid"};
+        std::vector<std::string> how{"-r", "60", "--solid"};
         how.insert(how.end(), rule.begin(), rule.end());
         const two_ways solid{folder, folder / "m.ply", how};
         ASSERT_EQ(0, solid.draw("tight.nvdb", little).code);

@@ -7,6 +7,7 @@
 // solid is drawn after its surface, and the voxels inside are filled on the host.
 
 #include "backend_memory.hpp"
+#include "body_fill.hpp"
 #include "model/parallel.hpp"
 #include "model/placement.hpp"
 #include "model/resolve.hpp"
@@ -58,7 +59,16 @@ public:
         if (wants(target::triangle) && stats_.triangles + num_lines > INT32_MAX)
             throw std::runtime_error("more triangles and lines than --target triangle can number");
         const stage_timer timer{*this, "upload"};
+        const bool fills_bodies = request.solid && request.solid->fill == solid_fill::body &&
+                                  (request.wants_colors() || wants(target::material));
+        if (fills_bodies) bodies_ = std::make_unique<model_bodies>(model, request); // before the scene is taken
         uploaded_ = std::make_unique<uploaded_scene<Backend>>(backend, model, request, wanted_, draws_lines_);
+        if (fills_bodies) {
+            if constexpr (memory_access<Backend>::on_host)
+                bodies_->take_draws(uploaded_->bits_draws());
+            else
+                bodies_->make_draws(model);
+        }
         only_bits_ = !uploaded_->has_masks() && !draws_lines_ && !wants(target::color) && !wants(target::color_max) &&
                      !wants(target::color_replace) && !wants(target::normal) && !wants(target::material) &&
                      !wants(target::triangle) && !wants(target::depth);
@@ -325,6 +335,8 @@ protected: // sparse_pipeline draws the same into bricks
 
     // The volume's other values, once all bits are there.
     void finish_solid(volume& result);
+    // Gives the voxels of SOLID that are not of SURFACE the colour and the material of the nearest triangle.
+    void fill_nearest(volume& result, const channel& solid, const channel& surface);
     // What the flood of --solid exterior did; and which repairs help an open model, each of which is tried. Does
     // nothing for a part of the model, and where the bits do not fit into the run's memory. Throws grid_error for
     // a flood where the grid lies within the model: what is outside follows from the whole.
@@ -408,6 +420,7 @@ protected: // sparse_pipeline draws the same into bricks
     const std::string inside_name_ = "inside"; // the channel of a solid's bits where no occupancy is asked for
     std::function<void(double)> report_;
     std::unique_ptr<uploaded_scene<Backend>> uploaded_;
+    std::unique_ptr<model_bodies> bodies_; // with --fill body, where it shows
     std::unique_ptr<surface_framebuffer> surface_framebuffer_;
     std::unique_ptr<bits_framebuffer> bits_framebuffer_;
     std::unique_ptr<bits_framebuffer> solid_framebuffer_;

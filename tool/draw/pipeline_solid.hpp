@@ -4,6 +4,7 @@
 // Solids in the tool's pipeline: their bits, slab by slab, and the values of the voxels inside. Part of pipeline.hpp:
 // a file that instantiates the pipeline includes it.
 
+#include "distance/distance_shader.hpp"
 #include "model/memory.hpp"
 #include "model/placement.hpp"
 #include "pipeline.hpp"
@@ -12,7 +13,10 @@
 
 #include <algorithm>
 #include <bitset>
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -75,7 +79,63 @@ void pipeline<Backend>::finish_solid(volume& result) {
     warn_of_solid(static_cast<std::uint64_t>(result.popcount(solid)),
                   draws_surface_ ? static_cast<std::uint64_t>(result.popcount(*result.find(bits_name_))) : 0);
     if (wants(target::count) && !counts_bodies()) count_bits(result, solid, request_.threads);
-    if (draws_surface_) fill_inside(result, solid, *result.find(bits_name_), *request_.solid, request_.threads);
+    if (!draws_surface_) return;
+    const channel& surface = *result.find(bits_name_);
+    if constexpr (memory_access<Backend>::on_host)
+        if (request_.solid->fill == solid_fill::nearest) fill_nearest(result, solid, surface);
+    const voxelpipe::grid part = uploaded_->relative_grid();
+    std::optional<body_map> bodies;
+    if (bodies_) bodies.emplace(bodies_->find_in(part));
+    fill_inside(result, solid, surface, *request_.solid, bodies ? &*bodies : nullptr,
+                {part.offset.x, part.offset.y, part.offset.z}, request_.threads);
+}
+
+template <class Backend>
+void pipeline<Backend>::fill_nearest(volume& result, const channel& solid, const channel& surface) {
+    using number_target = vp::target<std::uint32_t, vp::blend::replace>;
+    using color_target = vp::target<glm::u8vec4, vp::blend::replace>;
+    using float_target = vp::target<float, vp::blend::replace>;
+    using view = vp::framebuffer_view<float_target, number_target, color_target,
+                                      vp::target<glm::vec3, vp::blend::replace>, float_target>;
+    using draw = vp::draw<vp::mesh_view<>, surface_vertex_shader, nearest_shader>;
+    const bool wants_color = request_.wants_colors();
+    if (!wants_color && !wants(target::material)) return;
+    std::vector<draw> draws;
+    for (const auto& d : uploaded_->draws())
+        draws.push_back({d.mesh, d.vertex_shader, {d.fragment_shader, wants_color}});
+    vp::distance_options how;
+    how.band = vp::band::whole;
+    how.sign = vp::distance_sign::none;
+    constexpr double voxel_bytes = sizeof(std::uint32_t) + sizeof(glm::u8vec4);
+    const int all = request_.grid.extent.z, depth = slab_depth(voxel_bytes);
+    for_each_slab(0, all, depth, [&](const voxelpipe::grid& part, int begin, int, int) {
+        const std::size_t voxels = static_cast<std::size_t>(part.extent.x) * static_cast<std::size_t>(part.extent.y) *
+                                   static_cast<std::size_t>(part.extent.z);
+        std::vector<std::uint32_t> numbers(voxels);
+        std::vector<glm::u8vec4> colors(wants_color ? voxels : 0);
+        const vp::status status = vp::voxelize_distance(
+            backend_, draws, part,
+            view::on(part.extent, nullptr, numbers.data(), wants_color ? colors.data() : nullptr, nullptr, nullptr),
+            how);
+        check(status, request_);
+        const material_of_triangle materials{numbers.data(), uploaded_->draw_table(), uploaded_->num_draws()};
+        const auto first = static_cast<std::size_t>(result.index(0, 0, begin));
+        for (channel& c : result.channels) {
+            const std::optional<target> id = target_named(c.name);
+            if (!id || (!is_color(*id) && *id != target::material)) continue;
+            for_each_voxel_in(result, begin, begin + part.extent.z, solid, surface, [&](std::size_t i) {
+                std::byte* const at = c.data.data() + 4 * i;
+                if (is_color(*id)) {
+                    glm::u8vec4 color = colors[i - first];
+                    color.a = 255;
+                    std::memcpy(at, &color, sizeof(color));
+                } else {
+                    const std::int32_t number = materials(i - first);
+                    std::memcpy(at, &number, sizeof(number));
+                }
+            });
+        }
+    });
 }
 
 template <class Backend>

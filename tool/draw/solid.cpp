@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "solid.hpp"
 
+#include "body_fill.hpp"
 #include "model/parallel.hpp"
 #include "model/srgb.hpp"
 #include "model/targets.hpp"
@@ -48,7 +49,80 @@ rgba8 mean_of(const volume& v, const channel& surface, const channel& colors, in
     return mean.mean_of({sums[0], sums[1], sums[2], sums[3]});
 }
 
+// Gives a channel's voxels of THOSE that are not of WITHOUT one value.
+void set_voxels(const volume& v, const channel& those, const channel& without, channel& c,
+                const std::array<std::byte, 16>& value, int threads) {
+    const std::size_t bytes = size_of(c.type) * static_cast<std::size_t>(c.components);
+    parallel_for(static_cast<std::size_t>(v.extent[2]), threads, [&](std::size_t layer) {
+        for_each_bit(
+            v, static_cast<std::int64_t>(layer),
+            [&](std::int64_t w, std::int64_t j, std::int64_t k) {
+                return v.word(those, w, j, k) & ~v.word(without, w, j, k);
+            },
+            [&](std::size_t i) { std::memcpy(c.data.data() + bytes * i, value.data(), bytes); });
+    });
+}
+
+// Gives a channel's voxels of SOLID that are not of SURFACE the values of their bodies, brick by brick.
+void set_by_body(const volume& v, const channel& solid, const channel& surface, channel& c, const fill_values& inside,
+                 const std::array<int, 3>& offset, int threads) {
+    constexpr int side = voxelpipe::core::sparse_brick_size;
+    const std::size_t bytes = size_of(c.type) * static_cast<std::size_t>(c.components);
+    const int first_layer = offset[2] / side, last_layer = (offset[2] + static_cast<int>(v.extent[2]) - 1) / side;
+    parallel_for(static_cast<std::size_t>(last_layer - first_layer + 1), threads, [&](std::size_t layer) {
+        const int bz = first_layer + static_cast<int>(layer);
+        body_map::labels each;
+        glm::ivec3 of_labels(-1); // the brick whose body is known
+        std::optional<std::uint32_t> one;
+        for (int by = offset[1] / side; by * side < offset[1] + static_cast<int>(v.extent[1]); ++by)
+            for (int bx = offset[0] / side; bx * side < offset[0] + static_cast<int>(v.extent[0]); ++bx)
+                for (int bit = 0; bit < side * side * side; ++bit) {
+                    const glm::ivec3 within = voxelpipe::core::morton_position(static_cast<std::uint64_t>(bit));
+                    const std::int64_t i = bx * side + within.x - offset[0], j = by * side + within.y - offset[1],
+                                       k = bz * side + within.z - offset[2];
+                    if (i < 0 || j < 0 || k < 0 || i >= v.extent[0] || j >= v.extent[1] || k >= v.extent[2]) continue;
+                    if (!v.bit(solid, i, j, k) || v.bit(surface, i, j, k)) continue;
+                    if (of_labels != glm::ivec3(bx, by, bz)) {
+                        of_labels = {bx, by, bz};
+                        one = inside.bodies()->of_brick(voxelpipe::core::morton_key(bx, by, bz), each);
+                    }
+                    const auto& value = inside.of(one ? *one : each[static_cast<std::size_t>(bit)]);
+                    std::memcpy(c.data.data() + bytes * static_cast<std::size_t>(v.index(i, j, k)), value.data(),
+                                bytes);
+                }
+    });
+}
+
 } // namespace
+
+fill_values::fill_values(target id, const solid_request& request, const body_map* bodies,
+                         const std::function<std::array<std::uint8_t, 4>()>& mean)
+    : bodies_(request.fill == solid_fill::body ? bodies : nullptr) {
+    const std::uint32_t empty = info_of(id).empty;
+    for (std::size_t at = 0; at < none_.size(); at += 4) std::memcpy(none_.data() + at, &empty, 4);
+    if (is_color(id)) {
+        rgba8 color{clay[0], clay[1], clay[2], 255};
+        if (request.fill == solid_fill::color)
+            color = {request.fill_color[0], request.fill_color[1], request.fill_color[2], 255};
+        else if (request.fill == solid_fill::mean || (bodies_ != nullptr && bodies_->leaves_voxels()))
+            color = mean();
+        std::memcpy(none_.data(), color.data(), color.size());
+    }
+    if (bodies_ == nullptr || (!is_color(id) && id != target::material)) {
+        bodies_ = nullptr;
+        return;
+    }
+    for (const body& b : bodies_->values()) {
+        auto& value = of_bodies_.emplace_back(none_);
+        if (is_color(id))
+            std::memcpy(value.data(), b.color.data(), b.color.size());
+        else
+            std::memcpy(value.data(), &b.material, sizeof(b.material));
+    }
+    if (!bodies_->is_everywhere()) return;
+    none_ = of_bodies_.front();
+    bodies_ = nullptr;
+}
 
 color_mean::color_mean() {
     const color_tables tables = make_color_tables();
@@ -135,33 +209,24 @@ std::string flood_warning(const solid_request& request, const solid_counts& coun
     return text + (keeping.empty() ? "No repair that was tried keeps them" : "Tried on it: " + keeping + " keeps them");
 }
 
-void fill_inside(volume& v, const channel& solid, const channel& surface, const solid_request& request, int threads) {
+void fill_inside(volume& v, const channel& solid, const channel& surface, const solid_request& request,
+                 const body_map* bodies, const std::array<int, 3>& offset, int threads) {
     threads = thread_count(threads);
     for (channel& c : v.channels) {
         const std::optional<target> id = target_named(c.name);
         if (!id || c.type == scalar::bit || *id == target::count) continue;
         const std::size_t bytes = size_of(c.type) * static_cast<std::size_t>(c.components);
-        std::array<std::byte, 16> empty{}, inside{};
+        std::array<std::byte, 16> empty{};
         for (std::size_t at = 0; at + 4 <= bytes; at += 4) std::memcpy(empty.data() + at, &info_of(*id).empty, 4);
-        inside = empty;
-        if (c.name.starts_with("color")) {
-            const rgba8 color = request.fill_color ? rgba8{(*request.fill_color)[0], (*request.fill_color)[1],
-                                                           (*request.fill_color)[2], 255}
-                                                   : mean_of(v, surface, c, threads);
-            std::memcpy(inside.data(), color.data(), 4);
+        const fill_values inside(*id, request, bodies, [&] { return mean_of(v, surface, c, threads); });
+        if (request.fill == solid_fill::nearest && (is_color(*id) || *id == target::material)) {
+            // They are there already.
+        } else if (inside.is_one()) {
+            set_voxels(v, solid, surface, c, inside.of(body_map::none), threads);
+        } else {
+            set_by_body(v, solid, surface, c, inside, offset, threads);
         }
-        parallel_for(static_cast<std::size_t>(v.extent[2]), threads, [&](std::size_t layer) {
-            const auto set = [&](const channel& those, const channel& without, const std::array<std::byte, 16>& value) {
-                for_each_bit(
-                    v, static_cast<std::int64_t>(layer),
-                    [&](std::int64_t w, std::int64_t j, std::int64_t k) {
-                        return v.word(those, w, j, k) & ~v.word(without, w, j, k);
-                    },
-                    [&](std::size_t i) { std::memcpy(c.data.data() + bytes * i, value.data(), bytes); });
-            };
-            if (inside != empty) set(solid, surface, inside);
-            set(surface, solid, empty);
-        });
+        set_voxels(v, surface, solid, c, empty, threads);
     }
 }
 

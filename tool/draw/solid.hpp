@@ -9,8 +9,9 @@
 #include <voxelpipe/status.hpp>
 
 #include <array>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,9 @@ struct hole_cones;
 } // namespace voxelpipe
 
 namespace voxelize {
+
+struct known_bodies; // body_fill.hpp
+class body_map;
 
 // The rule for what is inside; the first three are the library's fill rules for the model as one body.
 enum class solid_rule : std::uint8_t {
@@ -43,6 +47,14 @@ enum class solid_extent : std::uint8_t {
 [[nodiscard]] const char* to_string(solid_rule rule);
 [[nodiscard]] const char* to_string(solid_extent extent);
 
+// What the voxels inside get that no triangle touches: the option --fill.
+enum class solid_fill : std::uint8_t {
+    body,    // colour and material of the body that they lie in (body_fill.hpp)
+    nearest, // those of the nearest triangle (nearest_fill.hpp)
+    mean,    // the mean of the model's covered voxels, in linear light, by alpha; no material
+    color,   // solid_request::fill_color; no material
+};
+
 // The colour of the voxels inside, of each target that is a colour.
 using fill_means = std::array<std::array<std::uint8_t, 4>, target_count>;
 
@@ -58,10 +70,15 @@ struct solid_request {
     // exterior and vote of a slab along z: what the other slabs decide (voxelpipe::solid_options::slab), not owned.
     const voxelpipe::solid_slab* slab = nullptr;
     bool is_whole = false; // the whole model is drawn in the whole grid at once, so that it can be examined
-    // sRGB of the voxels inside; none: the mean of the model's covered voxels, in linear light, by alpha.
-    std::optional<std::array<std::uint8_t, 3>> fill_color;
+    solid_fill fill = solid_fill::body;
+    std::array<std::uint8_t, 3> fill_color{}; // sRGB, for solid_fill::color
     // For a slab, the means of the whole grid, not owned. Null: the slab is the whole grid.
     const fill_means* means = nullptr;
+    // For a part of the model, the bodies that its draws belong to, not owned. Null: the bodies of what is drawn.
+    const known_bodies* bodies = nullptr;
+
+    // True if a repair decides what is inside, so that it may be no body's.
+    [[nodiscard]] bool is_repaired() const { return vote || close_holes != 0 || rule == solid_rule::exterior; }
 };
 
 // As vp::solid_counters has them, of all slabs.
@@ -104,9 +121,23 @@ private:
 };
 
 // Gives every channel but those of bits and the count its values where the solid and the surface differ. Voxels of
-// SOLID without a bit in SURFACE get the colour of the fill, opaque, or the target's empty value. Voxels with a bit in
-// SURFACE alone are emptied. Both are bit channels of V.
-void fill_inside(volume& v, const channel& solid, const channel& surface, const solid_request& request, int threads);
+// SOLID without a bit in SURFACE get the values of their body, where BODIES has one; otherwise the colour of the fill,
+// opaque, or the target's empty value. Voxels with a bit in SURFACE alone are emptied. Both are bit channels of V,
+// whose first voxel is OFFSET in the whole grid. BODIES may be null.
+void fill_inside(volume& v, const channel& solid, const channel& surface, const solid_request& request,
+                 const body_map* bodies, const std::array<int, 3>& offset, int threads);
+
+// VISIT(number of a voxel) for the voxels of layers [begin, end) that are of SOLID and not of SURFACE, bit channels.
+template <class Visit>
+void for_each_voxel_in(const volume& v, std::int64_t begin, std::int64_t end, const channel& solid,
+                       const channel& surface, const Visit& visit) {
+    for (std::int64_t k = begin; k < end; ++k)
+        for (std::int64_t j = 0; j < v.extent[1]; ++j)
+            for (std::int64_t w = 0; w < v.words_per_row(); ++w)
+                for (std::uint32_t bits = v.word(solid, w, j, k) & ~v.word(surface, w, j, k); bits != 0;
+                     bits &= bits - 1)
+                    visit(static_cast<std::size_t>(v.index(32 * w + std::countr_zero(bits), j, k)));
+}
 
 // Copies the part at OFFSET of a grid of EXTENT, rows of packed bits, to the channel.
 void copy_part(volume& v, channel& to, const std::vector<std::uint32_t>& bits, const std::array<int, 3>& extent,

@@ -55,6 +55,9 @@ struct gltf_options {
     // them.
     std::optional<std::string> animation;
     double seconds = 0;
+    // Primitives show the material that this variant of the file (KHR_materials_variants), by name, gives them. None:
+    // their own.
+    std::optional<std::string> variant{};
     int threads = 0; // that read vertices and indices; 0: one for each core. The scene does not depend on it
     // False: pictures are read only for materials that cut fragments off by alpha, MASK and, if blend_cuts, BLEND; the
     // others have no texture then.

@@ -24,12 +24,17 @@ void scale_lengths(scene& model, double scale) {
 
 } // namespace
 
+void require_no_gltf_options(const gltf_options& options) {
+    if (options.animation) throw model_error("--animation is for glTF models");
+    if (options.variant) throw model_error("--variant is for glTF models");
+}
+
 scene load_model(const std::filesystem::path& file, const load_options& options) {
     const load_hooks hooks{[&](scene& model) { scale_lengths(model, options.scale); }, options.picture_hook};
     const std::string extension = assimp::lower_extension(file);
     const bool is_mesh = is_mesh_format(extension);
     if (!is_mesh && !is_for_assimp(extension)) return load_gltf(file, options.limits, options.gltf, hooks);
-    if (options.gltf.animation) throw model_error("--animation is for glTF models");
+    require_no_gltf_options(options.gltf);
     if (is_mesh) return scene_of(*open_mesh(file, options.gltf), file, options.limits, options.gltf, hooks);
     gltf_limits limits = options.limits;
     limits.room = std::min(limits.room, memory::room());

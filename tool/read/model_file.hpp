@@ -22,6 +22,9 @@ struct load_options {
     std::function<void(const scene&, picture&, const std::vector<std::uint32_t>& materials)> picture_hook;
 };
 
+// For files of other formats: throws model_error if an option is for glTF alone.
+void require_no_gltf_options(const gltf_options& options);
+
 // Throws model_error, and std::bad_alloc where an honest file does not fit into memory.
 [[nodiscard]] scene load_model(const std::filesystem::path& file, const load_options& options = {});
 

@@ -77,9 +77,11 @@ opened_stream open_stream(const std::filesystem::path& file, const stream_room& 
                           const std::filesystem::path& folder, const load_options& options) {
     const std::string extension = assimp::lower_extension(file);
     opened_stream opened;
+    const bool is_mesh = extension == ".obj" || is_mesh_format(extension);
+    if (is_mesh && (options.gltf.animation || options.gltf.variant)) return opened; // refused by load_model()
     if (extension == ".obj")
         opened = open_obj_stream(file, room, folder, options.limits, options.gltf);
-    else if (is_mesh_format(extension) && !options.gltf.animation && may_not_fit(file, room))
+    else if (is_mesh_format(extension) && may_not_fit(file, room))
         opened = stream_of(open_mesh(file, options.gltf), file, room, folder, options.limits, options.gltf);
     if (extension == ".glb" || extension == ".gltf")
         opened.stream = gltf_stream::open(file, room, options.limits, options.gltf);

@@ -10,6 +10,7 @@
 #include "read/named_files.hpp"
 #include "run_model.hpp"
 #include "run_outputs.hpp"
+#include "write/page/page.hpp"
 
 #include <nlohmann/json.hpp>
 #include <zlib.h>
@@ -242,6 +243,22 @@ std::vector<listed_model> models_of(const fs::path& file) {
     }
 }
 
+// The page that shows those of the first output of .html side by side. Nothing without such an output.
+std::optional<fs::path> page_beside(const command_line& options, const fs::path& folder) {
+    for (const fs::path& output : options.outputs)
+        if (lower_extension(output) == ".html") return folder / "side_by_side.html";
+    return std::nullopt;
+}
+
+void write_page_beside(const command_line& options, const std::vector<listed_model>& models, const fs::path& page) {
+    const auto pattern = std::find_if(options.outputs.begin(), options.outputs.end(),
+                                      [](const fs::path& output) { return lower_extension(output) == ".html"; });
+    std::vector<page_link> links;
+    for (const listed_model& model : models)
+        links.push_back({model.name, with_name(*pattern, model.name).lexically_proximate(page.parent_path())});
+    write_pages_beside(links, page);
+}
+
 // Compares the files that all models of the list write with those that the run reads. own_manifest: of this rank.
 // Throws output_conflict.
 output_check check_list(const command_line& options, const std::vector<listed_model>& models, const fs::path& folder,
@@ -253,6 +270,7 @@ output_check check_list(const command_line& options, const std::vector<listed_mo
     for (const fs::path& path : manifests_in(folder))
         if (path != own_manifest) check.add_input(path, "the manifest '" + path.string() + "'");
     check.add_output(own_manifest, {{own_manifest}, {}});
+    if (const auto page = page_beside(options, folder)) check.add_output(*page, {{*page}, {}});
 
     held_as held = held_as::unknown;
     if (options.storage != storage_choice::automatic)
@@ -401,6 +419,9 @@ int run_batch(const command_line& options) {
         running.start(options, models[i], std::move(work));
     }
     while (running.size() != 0) wait();
+    // The same whoever writes it: it names the pages of every rank.
+    if (const auto page = page_beside(options, folder); page && options.batch.rank == 0)
+        write_page_beside(options, models, *page);
     if (!options.quiet)
         std::cout << mine << " models: " << done - failed << " done, " << skipped << " were finished, " << failed
                   << " failed\n";

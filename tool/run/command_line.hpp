@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -39,10 +40,12 @@ struct command_line {
     // target leave them out, so that one output does not change the content or the names of another.
     std::vector<target> implied;
     storage_choice storage = storage_choice::automatic;
-    bool by_slabs = false;             // one model, drawn and written slab by slab
-    write_options write;               // all but its progress
-    std::uint64_t max_memory = 0;      // bytes, resident; 0: what the machine has
-    std::vector<std::string> warnings; // of what makes sense, but hardly what was meant; one line each
+    bool by_slabs = false;                    // one model, drawn and written slab by slab
+    write_options write;                      // all but its progress and blocks
+    std::filesystem::path block_file;         // the list of blocks; empty: there is none
+    std::shared_ptr<const block_list> blocks; // as it is read
+    std::uint64_t max_memory = 0;             // bytes, resident; 0: what the machine has
+    std::vector<std::string> warnings;        // of what makes sense, but hardly what was meant; one line each
     stats_format stats = stats_format::none;
     bool quiet = false;
 };

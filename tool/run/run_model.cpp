@@ -12,6 +12,7 @@
 #include "read/model_file.hpp"
 #include "run_outputs.hpp"
 #include "slab_run.hpp"
+#include "write/formats/blocks.hpp"
 #include "write/level_set.hpp"
 #include "write/sparse_formats.hpp"
 #include "write_bytes.hpp"
@@ -77,7 +78,20 @@ std::vector<std::filesystem::path> write_output(Volume& voxels, const command_li
             aside.push_back(std::move(voxels.channels.back()));
             voxels.channels.pop_back();
         }
+    // What --blocks asks for is in files of blocks alone.
+    const bool has_own = find_format(output)->has_blocks || std::find(options.implied.begin(), options.implied.end(),
+                                                                      target::material) == options.implied.end();
+    const auto material = std::find_if(voxels.channels.begin(), voxels.channels.end(), [&](const channel& c) {
+        return !has_own && c.name == info_of(target::material).name;
+    });
+    const auto place = material - voxels.channels.begin();
+    std::optional<channel> left_out;
+    if (material != voxels.channels.end()) {
+        left_out = std::move(*material);
+        voxels.channels.erase(material);
+    }
     std::vector<std::filesystem::path> files = write_to(voxels, output, how);
+    if (left_out) voxels.channels.insert(voxels.channels.begin() + place, std::move(*left_out));
     for (; !aside.empty(); aside.pop_back()) voxels.channels.push_back(std::move(aside.back()));
     return files;
 }
@@ -287,8 +301,12 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
         report.warnings.push_back("no sample of the grid lies within the band of --distance around the model");
 
     start = clock::now();
+    const std::shared_ptr<const block_list> blocks =
+        options.blocks ? with_materials(*options.blocks, options.block_file, report.materials, report.warnings)
+                       : nullptr;
     for (const std::filesystem::path& output : options.outputs) {
         write_options how = options.write;
+        how.blocks = blocks;
         how.lists = storage.lists;
         bar.start("writing " + output.filename().string());
         how.progress = [&bar](double done) { bar.show(done); };
@@ -317,7 +335,8 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
 // than LOADED_ROOM when it is loaded, on the CPU. folder: for temporary files. Throws as open_stream() does.
 opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder, double loaded_room) {
     const voxelize_request& request = options.voxelize;
-    const bool is_drawn_here = !request.distance && request.backend != backend_choice::cuda &&
+    const bool needs_dense = request.solid && request.solid->fill == solid_fill::nearest;
+    const bool is_drawn_here = !request.distance && !needs_dense && request.backend != backend_choice::cuda &&
                                request.strategy == voxelpipe::strategy::automatic &&
                                options.storage != storage_choice::dense;
     if (!is_drawn_here) return {};

@@ -39,7 +39,18 @@ void check_outputs(const command_line& options, const voxelize_request& request,
         if (assimp::lower_extension(file) != ".mtl") continue;
         for (const fs::path& picture : named_pictures(folder / file, folder)) check.add_named(picture, options.input);
     }
+    if (!options.block_file.empty())
+        check.add_input(options.block_file, "the list of blocks '" + options.block_file.string() + '\'');
     for (const fs::path& output : options.outputs) {
+        if (is_standard_output(output)) {
+            if (names_of_output(options, request, output, held).files.size() > 1)
+                throw output_conflict("output '" + output.string() +
+                                      "' is standard output, which holds one file: name one --target");
+            written_names names; // which may be the file of another output
+            names.files.emplace_back("/dev/stdout");
+            check.add_output(output, names, known != nullptr);
+            continue;
+        }
         check.add_output(output, names_of_output(options, request, output, held), known != nullptr);
         check_replaceable(output);
     }

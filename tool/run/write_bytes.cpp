@@ -70,7 +70,8 @@ double bytes_to_write(const std::filesystem::path& output, const expected_result
     const value_bytes values = bytes_of_values(result.targets);
     const double threads = thread_count(options.threads);
     double bricks = result.bricks, voxels = result.voxels, bytes = bytes_of_any;
-    if (is_one_of(extension, {".npz", ".vti", ".pvti", ".nrrd", ".schem", ".html"})) bytes += threads * bytes_of_thread;
+    if (is_one_of(extension, {".npz", ".vti", ".pvti", ".nrrd", ".schem", ".litematic", ".3mf", ".html"}))
+        bytes += threads * bytes_of_thread;
     if (extension == ".zarr") {
         constexpr double chunk_voxels = 64 * 64 * 64, copies = 2.3; // as it is, and with room for what it becomes
         bytes += threads * (bytes_of_thread / 2 + copies * chunk_voxels * values.largest);
@@ -82,18 +83,21 @@ double bytes_to_write(const std::filesystem::path& output, const expected_result
         voxels += result.in_tiles;
         bytes += (brick_bytes + source_bytes) * bricks + values.all * voxels;
     }
-    const bool shows_shape =
-        is_one_of(extension, {".vox", ".schem", ".binvox", ".glb", ".obj", ".ply", ".stl", ".xyz"});
+    const bool shows_shape = is_one_of(
+        extension, {".vox", ".schem", ".litematic", ".binvox", ".glb", ".obj", ".ply", ".stl", ".3mf", ".xyz"});
     if (!result.is_sparse && (shows_shape || is_one_of(extension, {".html", ".nvdb", ".vdb"}))) {
         constexpr double found_bytes = 90; // the bricks of each layer before they are sorted
         bytes += (brick_bytes + found_bytes) * bricks;
         if (!shows_shape) bytes += values.all * voxels;
     }
-    if (is_one_of(extension, {".glb", ".obj", ".stl"}) || (extension == ".ply" && !options.points))
+    if (is_one_of(extension, {".glb", ".obj", ".stl", ".3mf"}) || (extension == ".ply" && !options.points))
         bytes += bytes_of_mesh(result, voxels, threads);
     constexpr double items_at_once = 4 * 32768; // formatted by each thread
     if (extension == ".obj") bytes += of_line_of_mesh * std::min(2 * voxels, threads * items_at_once);
     if (extension == ".stl") bytes += of_triangle_of_stl * std::min(4 * voxels, threads * items_at_once);
+    if (extension == ".3mf") bytes += of_line_of_mesh * std::min(3 * voxels, threads * items_at_once);
+    // A piece of the blocks as numbers and as bytes, and 64 rows at least.
+    if (is_one_of(extension, {".schem", ".litematic"})) bytes += threads * 4 * std::max(1 << 19, 64 * result.extent.x);
     if (extension == ".xyz") bytes += of_line_of_point * std::min(voxels, threads * items_at_once);
     const bool has_colors = std::any_of(result.targets.begin(), result.targets.end(), is_color);
     if (extension == ".vox" && has_colors) bytes += bytes_of_palette;

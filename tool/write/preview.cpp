@@ -64,6 +64,13 @@ const channel* find_colors(std::span<const channel> channels) {
     return found;
 }
 
+const channel* find_shown(std::span<const channel> channels) {
+    if (const channel* const colors = find_colors(channels)) return colors;
+    for (const channel& c : channels)
+        if (c.type != scalar::bit && !c.data.empty() && c.name != "distance") return &c;
+    return nullptr;
+}
+
 const channel* find_colors(const volume& v) { return find_colors(std::span<const channel>(v.channels)); }
 
 namespace {
@@ -88,14 +95,14 @@ image render_preview(const volume& v, const preview_options& options, const std:
     if (v.occupancy() == nullptr) throw std::invalid_argument("the preview needs the occupancy");
     check(options);
     const preview_scene scene(v, thread_count(options.threads));
-    return render(v, scene, find_colors(v), options, progress);
+    return render(v, scene, find_shown(v.channels), options, progress);
 }
 
-image render_preview(const volume& v, const preview_bricks& bricks, const channel* colors,
+image render_preview(const volume& v, const preview_bricks& bricks, const channel* shown,
                      const preview_options& options, const std::function<void(double)>& progress) {
     check(options);
     const preview_scene scene(v, bricks);
-    return render(v, scene, colors, options, progress);
+    return render(v, scene, shown, options, progress);
 }
 
 } // namespace voxelize

@@ -3,8 +3,8 @@
 #pragma once
 
 // Draws the occupied voxels of a volume: rays through the packed bits, sun with soft shadows, ambient occlusion, a
-// shadow on the ground, colours from the "color" channel. Takes a volume and a camera, gives 8-bit sRGB pixels; the
-// same pixels for any number of threads.
+// shadow on the ground, colours from the "color" channel or of other values (preview_colors.hpp). Takes a volume and a
+// camera, gives 8-bit sRGB pixels; the same pixels for any number of threads.
 
 #include "model/volume.hpp"
 #include "preview_scene.hpp"
@@ -48,7 +48,7 @@ struct preview_options {
     double zoom = 1;           // 1 fits the occupied voxels into the picture, 2 shows them twice as large
     double field_of_view = 28; // degrees from top to bottom; 0 is an orthographic picture
     int samples = 2;           // rays a pixel along each axis, 1..8
-    bool use_color = true;     // false: clay even where there are colours
+    bool use_color = true;     // false: clay even where there are colours or other values
     bool edges = true;         // fine lines between voxels, where voxels are large enough to show them
     bool ground = true;        // shadow on a ground under the model, when seen from above
     background backdrop{};
@@ -67,14 +67,17 @@ struct image {
 // or four components. Null without such a channel.
 [[nodiscard]] const channel* find_colors(const volume& v);
 [[nodiscard]] const channel* find_colors(std::span<const channel> channels);
+// The channel that a picture shows: that of find_colors(), or else the first with values but "distance", which is about
+// the same at every voxel of a surface. Null without such a channel.
+[[nodiscard]] const channel* find_shown(std::span<const channel> channels);
 
 // Needs the occupancy channel. `progress` is called with 0..1, from the calling thread. Throws std::invalid_argument
 // when an option lies outside its range.
 [[nodiscard]] image render_preview(const volume& v, const preview_options& options,
                                    const std::function<void(double)>& progress = {});
 // The same picture of the same voxels as bricks, without anything dense: of `v` extent and voxel size count alone, and
-// `colors`, which may be null, has a value for each voxel of the bricks, in their order.
-[[nodiscard]] image render_preview(const volume& v, const preview_bricks& bricks, const channel* colors,
+// `shown`, which may be null, has a value for each voxel of the bricks, in their order.
+[[nodiscard]] image render_preview(const volume& v, const preview_bricks& bricks, const channel* shown,
                                    const preview_options& options, const std::function<void(double)>& progress = {});
 
 } // namespace voxelize

@@ -78,8 +78,8 @@ vec3 divided(const vec3& a, const vec3& b) { return {a[0] / b[0], a[1] / b[1], a
 
 preview_shader::preview_shader(const volume& v, const preview_scene& scene, const preview_options& options,
                                const channel* colors)
-    : volume_(v), scene_(scene), options_(options), colors_(options.use_color ? colors : nullptr),
-      axes_(axes_of(options.up)) {
+    : volume_(v), scene_(scene), options_(options),
+      colors_(options.use_color ? colors : nullptr, scene.is_sparse() ? nullptr : &v), axes_(axes_of(options.up)) {
     for (std::size_t n = 0; n < to_linear_.size(); ++n)
         to_linear_[n] = static_cast<float>(srgb_to_linear(static_cast<double>(n) / 255));
     for (std::size_t a = 0; a < 3; ++a) {
@@ -124,15 +124,11 @@ camera::ray preview_shader::ray_of(int x, int y) const {
 }
 
 rgb_linear preview_shader::albedo_of(const ray_hit& hit, const vec3& at, double pixels_per_voxel) const {
+    const auto number = scene_.is_sparse() ? static_cast<std::int64_t>(scene_.rank_of(hit.voxel))
+                                           : volume_.index(hit.voxel[0], hit.voxel[1], hit.voxel[2]);
+    const rgb8 bytes = colors_.of(number);
     rgb_linear color{};
-    if (colors_ != nullptr) {
-        const auto number = scene_.is_sparse() ? static_cast<std::int64_t>(scene_.rank_of(hit.voxel))
-                                               : volume_.index(hit.voxel[0], hit.voxel[1], hit.voxel[2]);
-        const std::byte* value = colors_->data.data() + number * colors_->components;
-        for (std::size_t a = 0; a < 3; ++a) color[a] = to_linear_[std::to_integer<std::size_t>(value[a])];
-    } else {
-        for (std::size_t a = 0; a < 3; ++a) color[a] = to_linear_[clay[a]];
-    }
+    for (std::size_t a = 0; a < 3; ++a) color[a] = to_linear_[bytes[a]];
     if (!options_.edges) return color;
     // A darker seam along the sides of the face. It fades out where a voxel is only a few pixels wide.
     const float strength = 0.30f * smooth_step(5, 16, pixels_per_voxel);

@@ -10,6 +10,7 @@
 
 #include "preview.hpp"
 #include "preview_camera.hpp"
+#include "preview_colors.hpp"
 #include "preview_scene.hpp"
 
 #include <cstdint>
@@ -23,8 +24,8 @@ using rgb_linear = std::array<float, 3>;
 class preview_shader {
 public:
     // All three must outlive the shader; the options are checked already.
-    // `colors` holds a value for each voxel of the volume or, if the scene is sparse, for each voxel of its bricks;
-    // null: no colours.
+    // `colors` holds a value for each voxel of the volume or, if the scene is sparse, for each voxel of its bricks, and
+    // may be of any type (preview_colors.hpp); null: no colours.
     preview_shader(const volume& v, const preview_scene& scene, const preview_options& options, const channel* colors);
 
     // The whole picture into `pixels`, RGB or RGBA, on `threads` threads (>= 1). `progress`, which may be empty, is
@@ -85,7 +86,7 @@ private:
     const volume& volume_;
     const preview_scene& scene_;
     const preview_options& options_;
-    const channel* colors_ = nullptr;
+    voxel_colors colors_;
     camera camera_;
     world_axes axes_;
     vec3 voxel_size_{};

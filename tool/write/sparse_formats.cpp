@@ -7,11 +7,11 @@
 #endif
 
 #include "write/formats/npy.hpp"
-#include "write/formats/npz.hpp"
 #include "write/formats/output_file.hpp"
 #include "write/formats/png.hpp"
 #include "write/formats/progress.hpp"
 #include "write/formats/voxel_shape.hpp"
+#include "write/formats/zip.hpp"
 #include "write/level_set.hpp"
 #include "write/page/page.hpp"
 
@@ -209,7 +209,7 @@ struct array {
     scalar type;
     int columns;
     std::uint64_t bytes;
-    std::function<void(const array_sink&)> stream; // hands out all bytes in order
+    std::function<void(const entry_sink&)> stream; // hands out all bytes in order
 };
 
 std::string header_of(const array& a, std::uint64_t voxels) {
@@ -225,7 +225,7 @@ std::string header_of(const array& a, std::uint64_t voxels) {
 std::vector<array> arrays_of(const sparse_volume& v) {
     std::vector<array> arrays;
     const std::uint64_t n = v.num_voxels();
-    const auto coords = [&v](const array_sink& sink) {
+    const auto coords = [&v](const entry_sink& sink) {
         std::vector<std::int32_t> rows;
         const voxelpipe::brick_table table = v.table();
         for (std::uint64_t b = 0; b < table.count; ++b) {
@@ -241,7 +241,7 @@ std::vector<array> arrays_of(const sparse_volume& v) {
     arrays.push_back({"coords", scalar::i32, 3, n * 12, coords});
     for (const channel& c : v.channels) {
         if (c.type == scalar::bit) continue; // every row is a voxel that is occupied
-        const auto values = [&c](const array_sink& sink) {
+        const auto values = [&c](const entry_sink& sink) {
             constexpr std::size_t piece = 1 << 20;
             for (std::size_t at = 0; at < c.data.size(); at += piece)
                 sink(std::span{c.data}.subspan(at, std::min(piece, c.data.size() - at)));
@@ -261,15 +261,19 @@ std::vector<std::filesystem::path> write_sparse_npz(const sparse_volume& v, cons
                                                     const write_options& options) {
     const std::vector<array> arrays = arrays_of(v);
     progress_meter meter(options.progress, bytes_of(arrays));
-    npz_archive archive(path, options.compression);
+    output_file out(path);
+    zip_archive archive(out, options.compression);
     for (const array& a : arrays)
-        archive.add(a.name, header_of(a, v.num_voxels()), [&](const array_sink& sink) {
+        archive.add(a.name + ".npy", [&](const entry_sink& sink) {
+            const std::string header = header_of(a, v.num_voxels());
+            sink(std::as_bytes(std::span{header}));
             a.stream([&](std::span<const std::byte> piece) {
                 sink(piece);
                 meter.advance(piece.size());
             });
         });
-    archive.commit();
+    archive.finish();
+    out.commit();
     return {path};
 }
 
@@ -299,7 +303,7 @@ std::vector<std::filesystem::path> write_sparse_png(const sparse_volume& v, cons
     const preview_bricks bricks{v.keys.data(), v.masks.empty() ? nullptr : v.masks.front().words, v.offsets.data(),
                                 v.keys.size()};
     return write_picture(path, options, [&](const preview_options& preview) {
-        return render_preview(v.shape, bricks, find_colors(v.channels), preview, options.progress);
+        return render_preview(v.shape, bricks, find_shown(v.channels), preview, options.progress);
     });
 }
 

@@ -9,6 +9,7 @@
 #include <voxelpipe/core/bits.hpp>
 #include <voxelpipe/core/half.hpp>
 
+#include <cstddef>
 #include <cstdint>
 
 namespace voxelpipe::core {
@@ -20,7 +21,7 @@ inline constexpr std::uint32_t sum_nan = 4;
 // 64 * Limbs + 32 bits, two's complement, with marks for terms that are not finite.
 template <int Limbs>
 struct wide_sum {
-    std::uint64_t limb[Limbs];
+    std::uint64_t limb[std::size_t{Limbs}];
     std::int32_t top;
     std::uint32_t marks;
 };

@@ -108,7 +108,7 @@ struct fold_level {
 // Sums of all terms below a voxel, and what divides them.
 template <class Sum, int Components>
 struct level_sums {
-    Sum sums[Components]{};
+    Sum sums[std::size_t{Components}]{};
     std::uint64_t count = 0;
     bool exists = false;
 };

@@ -52,7 +52,7 @@ inline constexpr bool sums_terms<reduce::mean<C>> = true;
 // A sum that holds the sums of 2^63 voxels: as wide_sum, with 64 bits at the top.
 template <int Limbs>
 struct tree_sum {
-    std::uint64_t limb[Limbs]{};
+    std::uint64_t limb[std::size_t{Limbs}]{};
     std::int64_t top = 0;
     std::uint32_t marks = 0;
 
@@ -81,7 +81,7 @@ template <int Limbs>
 // |sum| as magnitude * 2^exponent, the last bit sticky where bits fall off.
 template <int Limbs>
 [[nodiscard]] VOXELPIPE_HD inline sum_magnitude to_magnitude(const tree_sum<Limbs>& s) {
-    std::uint64_t limb[Limbs + 1];
+    std::uint64_t limb[std::size_t{Limbs + 1}];
     for (int k = 0; k < Limbs; ++k) limb[k] = s.limb[k];
     limb[Limbs] = static_cast<std::uint64_t>(s.top);
     const bool negative = s.top < 0;

@@ -64,7 +64,7 @@ struct element_indices {
 
     struct located {
         std::uint32_t number, instance;
-        std::uint32_t index[K];
+        std::uint32_t index[std::size_t{K}];
         bool ok; // otherwise an index names no vertex
     };
     [[nodiscard]] VOXELPIPE_HD located locate(std::uint32_t i) const {

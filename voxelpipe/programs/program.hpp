@@ -23,6 +23,7 @@
 
 #include <glm/vec3.hpp>
 
+#include <cstddef>
 #include <cstdint>
 #include <type_traits>
 
@@ -135,8 +136,8 @@ struct triangles {
     using vertex_type = vertex_output<Varyings>; // what the vertex shader returns
     static constexpr int capacity = N;           // most triangles of one element
 
-    vertex_type vertices[3 * N]; // three a triangle
-    int count = 0;               // a call fails with bad_count unless this is 0 to N
+    vertex_type vertices[std::size_t{3 * N}]; // three a triangle
+    int count = 0;                            // a call fails with bad_count unless this is 0 to N
 
     // Appends a triangle. Beyond N it only counts, and the call fails.
     VOXELPIPE_HD void add(const vertex_type& a, const vertex_type& b, const vertex_type& c) {

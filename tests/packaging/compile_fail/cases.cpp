@@ -376,3 +376,18 @@ vp::grid fit_device_memory(vp::cpu_backend& backend, const vp::mesh<vp::cpu_back
 #if CASE_fast_math || ALL // compile without -ffast-math
 // flags: -ffast-math
 #endif
+#if CASE_occupied_struct || ALL // a struct needs an operator==
+namespace occupied_struct {
+struct value {
+    int number;
+    RIGHT(bool operator==(const value&) const = default;)
+};
+int count() {
+    vp::cpu_backend backend;
+    const vp::framebuffer<vp::cpu_backend, vp::target<value, vp::blend::replace>> values{backend, {8, 8, 8}};
+    int occupied = 0;
+    vp::for_each_occupied(vp::get<0>(values).to_host_target(backend), [&](const glm::ivec3&, const value&) { ++occupied; });
+    return occupied;
+}
+}
+#endif

@@ -28,6 +28,7 @@ class Browser:
         os.close(from_us[0])
         os.close(to_us[1])
         self.out, self.incoming, self.rest, self.number, self.session = from_us[1], to_us[0], b"", 0, None
+        self.events = []
         page = next(t for t in self.call("Target.getTargets")["targetInfos"] if t["type"] == "page")
         self.session = self.call("Target.attachToTarget", targetId=page["targetId"], flatten=True)["sessionId"]
         self.call("Emulation.setFocusEmulationEnabled", enabled=True)
@@ -61,6 +62,8 @@ class Browser:
                 self.rest += read
             line, self.rest = self.rest.split(b"\0", 1)
             answer = json.loads(line)
+            if "method" in answer:
+                self.events.append(answer)
             if answer.get("id") == self.number:
                 if "error" in answer:
                     raise RuntimeError(f"{method}: {answer['error']}")
@@ -81,6 +84,11 @@ class Browser:
         self.call("Page.navigate", url=address)
         self.wait_for("document.readyState === 'complete' && !!document.body.dataset.state")
 
+    def visit(self, address):
+        """Opens any page, and waits until all that it names is loaded."""
+        self.call("Page.navigate", url=address)
+        self.wait_for("document.readyState === 'complete' && location.href !== 'about:blank'", 300)
+
     def press(self, key):
         for kind in ("keyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=key, **({"text": key} if kind == "keyDown" and len(key) == 1 else {}))
@@ -89,6 +97,30 @@ class Browser:
         for kind, (x, y) in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=0 if kind == "mouseReleased" else 1,
                       clickCount=1)
+
+    def move(self, to):
+        self.call("Input.dispatchMouseEvent", type="mouseMoved", x=to[0], y=to[1])
+
+    def tap(self, at):
+        self.call("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": at[0], "y": at[1], "id": 0}])
+        self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
+    def resize(self, width, height):
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+
+    def frames(self):
+        """The frames within the page, each by the number of the world that its script runs in."""
+        tree = self.call("Page.getFrameTree")["frameTree"]
+        ids = [child["frame"]["id"] for child in tree.get("childFrames", [])]
+        self.events = []
+        self.call("Runtime.disable")
+        self.call("Runtime.enable")  # which names every world
+        worlds = [e["params"]["context"] for e in self.events if e["method"] == "Runtime.executionContextCreated"]
+        worlds = {w["auxData"]["frameId"]: w["id"] for w in worlds if w["auxData"].get("isDefault")}
+        return [worlds[i] for i in ids]
+
+    def evaluate_in(self, frame, expression):
+        return self.call("Runtime.evaluate", expression=expression, returnByValue=True, contextId=frame)["result"].get("value")
 
     def pinch(self, before, after):
         """Two fingers, each from one place to another."""

@@ -175,9 +175,11 @@ TEST_F(OutputFile, RefusesWhatItCannotWrite) {
     volume v = make_volume({4, 4, 4});
     v.add("count", scalar::u32);
     const auto message = [&](const char* name) { return message_of([&] { write(v, folder_ / name); }); };
-    EXPECT_NE(message("a.abc").find(
-                  ".npy, .npz, .vox, .schem, .binvox, .vti, .pvti, .nrrd, .zarr, .glb, .obj, .ply, .stl, .xyz, .png"),
-              std::string::npos);
+    EXPECT_NE(
+        message("a.abc").find(
+            ".npy, .npz, .vox, .schem, .litematic, .binvox, .vti, .pvti, .nrrd, .zarr, .glb, .obj, .ply, .stl, .3mf, "
+            ".xyz, .png"),
+        std::string::npos);
     EXPECT_NE(message("noextension").find("extension"), std::string::npos);
     for (const char* name : {"a.vox", "a.schem", "a.binvox", "a.glb", "a.obj", "a.ply", "a.stl", "a.xyz", "a.png"})
         EXPECT_NE(message(name).find("needs the occupancy"), std::string::npos) << name;

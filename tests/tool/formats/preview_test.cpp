@@ -5,8 +5,12 @@
 
 #include "test_volumes.hpp"
 #include "write/formats/formats.hpp"
+#include "write/page/page_text.hpp"
+#include "write/preview_colors.hpp"
+#include "write/sparse_formats.hpp"
 
 #include <cmath>
+#include <limits>
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
@@ -210,6 +214,81 @@ TEST(Preview, ColorIsFoundByName) {
     v.channels.pop_back();
     v.add("color", scalar::u8, 4);
     EXPECT_EQ(find_colors(v)->name, "color");
+}
+
+// A ball whose voxels have their height as "height", and the greatest of all but one.
+volume make_heights(std::int64_t n) {
+    volume v = make_ball(n);
+    v.channels.pop_back();
+    v.add("height", scalar::f32);
+    for (std::int64_t i = 0; i < v.num_voxels(); ++i) {
+        const float height = i == v.num_voxels() / 2 ? 1e6f : static_cast<float>(i / n % n);
+        std::memcpy(v.channels[1].data.data() + 4 * i, &height, 4);
+    }
+    return v;
+}
+
+TEST(Preview, ValuesAreShownByAColorMapFromTheFirstToTheLastPercentile) {
+    const volume v = make_heights(40);
+    ASSERT_EQ(find_shown(v.channels), &v.channels[1]);
+    const voxel_colors colors(&v.channels[1], &v);
+    EXPECT_GT(colors.low(), 0.0);
+    EXPECT_LT(colors.low(), 4.0);
+    EXPECT_GT(colors.high(), 35.0);
+    EXPECT_LT(colors.high(), 40.0); // the million is one voxel of many
+    EXPECT_EQ(colors.of(v.index(20, 0, 20)), color_ramp.front());
+    EXPECT_EQ(colors.of(v.index(20, 39, 20)), color_ramp.back());
+    // The picture has the colours: its top is yellow, its bottom is violet.
+    const image p = render_preview(v, small_picture());
+    const std::array<int, 4> top = pixel(p, p.width / 2, 12), bottom = pixel(p, p.width / 2, p.height - 12);
+    EXPECT_GT(top[1], top[2] + 60);
+    EXPECT_GT(bottom[2], bottom[1] + 10);
+    preview_options plain = small_picture();
+    plain.use_color = false;
+    EXPECT_GT(difference(render_preview(v, plain), p), 5.0);
+}
+
+TEST_F(Png, BricksShowTheSameValues) {
+    volume v = make_heights(40);
+    write_options o;
+    o.preview = small_picture();
+    write(v, folder_ / "dense.png", o);
+    write_sparse(make_sparse(v, 1), folder_ / "bricks.png", o);
+    EXPECT_EQ(read_file(folder_ / "dense.png"), read_file(folder_ / "bricks.png"));
+    v.channels[1].name = "distance"; // about the same at every voxel of a surface
+    EXPECT_EQ(find_shown(v.channels), nullptr);
+}
+
+TEST(Preview, ColorsOfNumbersDirectionsAndWhatIsNoNumber) {
+    volume v = make_volume({3, 1, 1});
+    v.add("occupancy", scalar::bit);
+    for (std::int64_t i = 0; i < 3; ++i) v.set_bit(v.channels[0], i, 0, 0);
+    const auto fill_with = [](channel& c, const auto& values) {
+        std::memcpy(c.data.data(), values.data(), c.data.size());
+    };
+    fill_with(v.add("material", scalar::i32), std::array<std::int32_t, 3>{0, 1, 0});
+    const voxel_colors materials(&v.channels[1], &v);
+    EXPECT_EQ(materials.of(0), materials.of(2));
+    EXPECT_NE(materials.of(0), materials.of(1));
+    fill_with(v.add("normal", scalar::f32, 3), std::array<float, 9>{1, 0, 0, 0, -1, 0, 0, 0, 1});
+    EXPECT_EQ(voxel_colors(&v.channels[2], &v).of(0), (rgb8{255, 127, 127}));
+    EXPECT_EQ(voxel_colors(&v.channels[2], &v).of(1), (rgb8{127, 0, 127}));
+    fill_with(v.add("depth", scalar::f32), std::array<float, 3>{1, std::numeric_limits<float>::quiet_NaN(), 1});
+    const voxel_colors depths(&v.channels[3], &v);
+    EXPECT_EQ(depths.of(1), (rgb8{128, 128, 128}));
+    EXPECT_EQ(depths.of(0), color_ramp.front()); // one value alone
+    fill_with(v.add("count", scalar::u32), std::array<std::uint32_t, 3>{1, 2, 3});
+    EXPECT_EQ(voxel_colors(&v.channels[4], nullptr).of(2), color_ramp.back());
+    EXPECT_EQ(find_shown(v.channels), &v.channels[1]);
+}
+
+TEST(Preview, TheColorMapIsThatOfThePage) {
+    std::string ramp = "const ramp = [";
+    for (const rgb8& c : color_ramp) {
+        if (ramp.back() == ']') ramp += ", ";
+        ramp += '[' + std::to_string(c[0]) + ", " + std::to_string(c[1]) + ", " + std::to_string(c[2]) + ']';
+    }
+    EXPECT_NE(std::string_view::npos, page_text.find(ramp + "];")) << ramp;
 }
 
 TEST(Preview, ClayWhenColorsAreNotWanted) {

@@ -5,8 +5,8 @@
 
 #include "model/targets.hpp"
 #include "test_volumes.hpp"
+#include "write/formats/blocks.hpp"
 #include "write/formats/formats.hpp"
-#include "write/formats/schem.hpp"
 #include "write/sparse_formats.hpp"
 
 #include <cstdio>
@@ -61,11 +61,36 @@ volume with_targets(std::array<std::int64_t, 3> extent, std::uint32_t density) {
     return v;
 }
 
+// 300 blocks of generated colours, and two of materials.
+std::shared_ptr<const block_list> many_blocks() {
+    auto list = std::make_shared<block_list>();
+    for (std::uint32_t n = 0; n < 300; ++n) {
+        list->names.push_back("test:block_" + std::to_string(n) + (n % 7 == 0 ? "[axis=y,lit=true]" : ""));
+        const std::uint32_t h = pattern(n, 1, 2, 0, 0);
+        list->colors.push_back(
+            {{static_cast<std::uint8_t>(h), static_cast<std::uint8_t>(h >> 8U), static_cast<std::uint8_t>(h >> 16U)},
+             static_cast<std::uint16_t>(n + 1)});
+    }
+    list->names.emplace_back("minecraft:glass");
+    list->of_number = {{1, 301}, {3, 2}, {4, 301}};
+    return list;
+}
+
+// Numbers from -1 to 4.
+void add_materials(volume& v) {
+    channel& c = v.add("material", scalar::i32);
+    for (std::int64_t k = 0; k < v.extent[2]; ++k)
+        for (std::int64_t j = 0; j < v.extent[1]; ++j)
+            for (std::int64_t i = 0; i < v.extent[0]; ++i)
+                store(c.data.data() + 4 * v.index(i, j, k), static_cast<std::int32_t>(pattern(i, j, k, 9, 0) % 6) - 1);
+}
+
 std::vector<sample_case> make_cases() {
     const std::vector<std::string> any{".npy", ".npz", ".vti", ".pvti", ".nrrd", ".zarr"};
-    const std::vector<std::string> solid{".npy", ".npz", ".vti", ".nrrd", ".zarr", ".vox", ".schem", ".binvox",
-                                         ".glb", ".obj", ".ply", ".stl",  ".xyz",  ".png", ".html"};
-    const std::vector<std::string> meshes{".glb", ".obj", ".ply", ".stl"};
+    const std::vector<std::string> solid{".npy",   ".npz",       ".vti",    ".nrrd", ".zarr", ".vox",
+                                         ".schem", ".litematic", ".binvox", ".glb",  ".obj",  ".ply",
+                                         ".stl",   ".3mf",       ".xyz",    ".png",  ".html"};
+    const std::vector<std::string> meshes{".glb", ".obj", ".ply", ".stl", ".3mf"};
     std::vector<sample_case> cases;
     const auto add = [&](const char* name, std::array<std::int64_t, 3> extent, std::uint32_t density, bool color,
                          bool all_types, const std::vector<std::string>& extensions) -> sample_case& {
@@ -81,15 +106,23 @@ std::vector<sample_case> make_cases() {
     add("thin", {3, 1, 200}, 2, true, false, solid);
     add("long", {300, 17, 40}, 23, true, false, solid);
     add("split", {260, 40, 513}, 997, true, false, {".vox", ".schem", ".binvox"}).options.up = up_axis::z;
+    add("upright", {26, 40, 51}, 17, true, false, {".litematic"}).options.up = up_axis::z;
     add("split_y", {270, 513, 33}, 997, true, false, {".vox"});
     add("empty", {9, 8, 7}, 0, false, false,
-        {".npy", ".npz", ".vti", ".nrrd", ".zarr", ".schem", ".binvox", ".glb", ".obj", ".ply", ".stl", ".xyz", ".png",
-         ".html"});
+        {".npy", ".npz", ".vti", ".nrrd", ".zarr", ".schem", ".litematic", ".binvox", ".glb", ".obj", ".ply", ".stl",
+         ".3mf", ".xyz", ".png", ".html"});
     add("merged", {40, 33, 21}, 2, false, false, meshes).options.merge_faces = true;
     add("merged_colors", {40, 33, 21}, 1, true, false, meshes).options.merge_faces = true;
     add("pieces", {37, 23, 11}, 5, true, false, meshes).options.faces_per_file = 1000;
     add("points", {37, 23, 11}, 5, true, false, {".ply"}).options.points = true;
-    add("boxes", {37, 23, 11}, 5, true, false, {".glb", ".obj", ".ply", ".stl", ".xyz"}).v.voxel_size = {0.1, 0.25, 3};
+    add("boxes", {37, 23, 11}, 5, true, false, {".glb", ".obj", ".ply", ".stl", ".3mf", ".xyz"}).v.voxel_size = {
+        0.1, 0.25, 3};
+    sample_case& flat = add("stored", {37, 23, 11}, 5, true, false, {".3mf"});
+    flat.options.compression = 0;
+    // Blocks of a list: of three materials out of five, and of more colours than a byte can number.
+    sample_case& listed = add("listed", {37, 23, 11}, 2, true, false, {".schem", ".litematic"});
+    listed.options.blocks = many_blocks();
+    add_materials(listed.v);
     sample_case& types = add("types", {13, 7, 5}, 2, false, true, any);
     types.v.voxel_size = {0.1, 0.25, 3};
     types.extensions.push_back(".html");
@@ -141,7 +174,9 @@ std::string describe(const sample_case& c, const std::map<std::string, std::vect
         out.append("[\"").append(ch.name).append("\", \"").append(name_of(ch.type));
         out.append("\", ").append(std::to_string(ch.components)).append("]");
     }
-    out += "],\n   \"files\": {";
+    out += "],\n   \"listed\": ";
+    out += c.options.blocks ? "true" : "false";
+    out += ", \"files\": {";
     bool first = true;
     for (const auto& [extension, paths] : files) {
         if (!first) out += ", ";
@@ -154,6 +189,18 @@ std::string describe(const sample_case& c, const std::map<std::string, std::vect
         out += "]";
     }
     return out + "}}";
+}
+
+// What the blocks of a list are, for the reader: names, colours with their numbers, numbers of materials.
+void write_table(const std::filesystem::path& path, const block_list& list) {
+    std::string names, colors, materials;
+    for (const std::string& name : list.names) names += (names.empty() ? "\"" : ", \"") + name + "\"";
+    for (const block_list::of_color& c : list.colors)
+        colors += (colors.empty() ? "[[" : ", [[") + list_of(c.color) + "], " + std::to_string(c.block) + "]";
+    for (const auto& [number, block] : list.of_number)
+        materials += (materials.empty() ? "[" : ", [") + std::to_string(number) + ", " + std::to_string(block) + "]";
+    std::ofstream(path) << "{\"names\": [" << names << "],\n\"colors\": [" << colors << "],\n\"materials\": ["
+                        << materials << "]}\n";
 }
 
 } // namespace
@@ -184,14 +231,9 @@ int main(int argc, char** argv) {
         }
         std::ofstream out(folder / "manifest.json");
         out << "[\n" << manifest << "\n]\n";
-        std::string blocks;
-        for (const block_color& b : schem_blocks()) {
-            if (!blocks.empty()) blocks += ",\n";
-            blocks += "[\"" + std::string(b.name) + "\", [" + list_of(b.color) + "]]";
-        }
-        std::ofstream table(folder / "blocks.json");
-        table << "[\n" << blocks << "\n]\n";
-        return out && table ? 0 : 1;
+        write_table(folder / "blocks.json", default_blocks());
+        write_table(folder / "listed.json", *many_blocks());
+        return out ? 0 : 1;
     } catch (const std::exception& e) {
         std::cerr << "write_samples: " << e.what() << "\n";
         return 1;

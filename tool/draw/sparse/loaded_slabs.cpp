@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "loaded_slabs.hpp"
 
+#include "draw/body_fill.hpp"
 #include "model/memory.hpp"
 #include "streamed_model.hpp"
 
@@ -15,8 +16,9 @@ namespace slabs = voxelpipe::slabs;
 loaded_slabs::loaded_slabs(scene&& model, const voxelize_request& request, std::span<const slabs::layer_range> all,
                            std::span<const std::size_t> drawn, const std::filesystem::path& folder,
                            const pass_files* kept, voxelize_stats& stats)
-    : request_(request), model_(std::move(model), request),
-      passes_(request_, all, drawn, static_cast<double>(memory::room()), folder, kept), steps_(drawn.size()) {
+    : request_(request), with_means_(needs_mean(request, model.materials)), model_(std::move(model), request),
+      passes_(request_, with_means_, all, drawn, static_cast<double>(memory::room()), folder, kept),
+      steps_(drawn.size()) {
     for (std::size_t s = 0; s < all.size(); ++s) steps_ += static_cast<std::size_t>(passes_.left_of(s));
     const glm::ivec3 extent = request.grid.extent;
     passes_.run(

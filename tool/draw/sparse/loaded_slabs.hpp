@@ -37,6 +37,7 @@ private:
     [[nodiscard]] voxelize_request next_step(const voxelpipe::grid& grid);
 
     voxelize_request request_;
+    bool with_means_; // before the model is moved on
     sparse_drawer model_;
     slab_passes passes_;
     std::size_t done_ = 0, steps_;

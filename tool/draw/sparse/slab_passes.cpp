@@ -38,12 +38,12 @@ std::vector<T> take_front(std::span<const std::byte>& from, std::size_t count) {
 
 } // namespace
 
-slab_passes::slab_passes(const voxelize_request& request, std::span<const slabs::layer_range> all,
+slab_passes::slab_passes(const voxelize_request& request, bool with_means, std::span<const slabs::layer_range> all,
                          std::span<const std::size_t> drawn, double room, std::filesystem::path folder,
                          const pass_files* kept)
     : request_(request), slabs_(all.begin(), all.end()), room_(room), folder_(std::move(folder)), kept_(kept),
       floods_(request.solid && request.solid->rule == solid_rule::exterior), sees_(request.wants(target::color_outer)),
-      fills_(request.solid && !request.solid->fill_color && request.wants_colors()) {
+      fills_(with_means) {
     if (floods_) {
         is_whole_ = !std::all_of(drawn.begin(), drawn.end(), [&](std::size_t slab) { return has_borders(slab); });
         if (is_whole_) left_.push_back(slab_pass::walls);

@@ -36,9 +36,10 @@ enum class slab_pass : std::uint8_t { walls, columns, means };
 // Members throw memory_error, std::bad_alloc, write_error, and std::system_error of files.
 class slab_passes {
 public:
-    // request: of the whole grid, with its padding. slabs: layers that ascend and make it up. drawn: those that will
-    // be. room: bytes that the run may take. folder: for temporary files. kept: null if no other run shares the slabs.
-    slab_passes(const voxelize_request& request, std::span<const voxelpipe::slabs::layer_range> slabs,
+    // request: of the whole grid, with its padding. with_means: the mean of colours is needed. slabs: layers that
+    // ascend and make it up. drawn: those that will be. room: bytes that the run may take. folder: for temporary files.
+    // kept: null if no other run shares the slabs.
+    slab_passes(const voxelize_request& request, bool with_means, std::span<const voxelpipe::slabs::layer_range> slabs,
                 std::span<const std::size_t> drawn, double room, std::filesystem::path folder, const pass_files* kept);
 
     // True if each slab's inside is known without a triangle of it.

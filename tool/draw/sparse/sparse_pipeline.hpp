@@ -351,18 +351,34 @@ private:
         sparse_volume result;
         result.shape = surface_of.shape;
         take_bricks(result, framebuffer);
+        // Counts of several bodies make no tiles, so all counts are 1 where there are tiles, which may be opened or
+        // cut.
+        const bool has_counts = this->counts_bodies() && result.tiles.empty();
         if (!surface_of.keys.empty() && !result.tiles.empty()) result = open_tiles(result, &surface_of.keys);
         if (part.extent != wanted_part.extent)
             keep_part(result, wanted_part.offset, wanted_part.extent);
         else if (is_flood && wanted_part.offset.x != 0 && !result.tiles.empty()) // as without slabs, where it is padded
             result = open_tiles(result);
+        std::optional<body_map> bodies;
+        if (this->bodies_) bodies.emplace(this->bodies_->find_in(wanted_part));
+        std::vector<fill_values> fills; // by target
+        for (const target wanted : this->request_.targets)
+            fills.push_back(wanted == target::occupancy || wanted == target::count
+                                ? fill_values{}
+                                : fill_of(surface_of, wanted, *this->request_.solid, bodies ? &*bodies : nullptr));
+        if (bodies && !bodies->is_everywhere() && !result.tiles.empty())
+            result = bodies->with_whole_tiles(result, [&](std::uint32_t a, std::uint32_t b) {
+                return std::all_of(fills.begin(), fills.end(),
+                                   [&](const fill_values& f) { return f.of(a) == f.of(b); });
+            });
         this->warn_of_solid(result.num_voxels(), surface_of.num_voxels());
-        for (const target wanted : this->request_.targets) {
+        for (std::size_t t = 0; t < fills.size(); ++t) {
+            const target wanted = this->request_.targets[t];
             if (wanted == target::occupancy)
                 add_occupancy(result);
             else if (wanted != target::count)
-                add_filled(result, surface_of, info_of(wanted).name, *this->request_.solid);
-            else if (this->counts_bodies())
+                add_filled(result, surface_of, info_of(wanted).name, fills[t]);
+            else if (has_counts)
                 copy<1, std::uint32_t>(result, wanted, framebuffer);
             else
                 resolve<std::uint32_t>(result, wanted, [](std::size_t) { return 1U; });

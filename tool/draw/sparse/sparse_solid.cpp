@@ -8,6 +8,7 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <optional>
 #include <utility>
 
 namespace voxelize {
@@ -16,8 +17,7 @@ namespace {
 
 using rgba8 = color_mean::rgba8;
 
-rgba8 fill_color_of(const channel& colors, const solid_request& request) {
-    if (request.fill_color) return {(*request.fill_color)[0], (*request.fill_color)[1], (*request.fill_color)[2], 255};
+rgba8 mean_of(const channel& colors, const solid_request& request) {
     if (request.means != nullptr) return (*request.means)[static_cast<std::size_t>(*target_named(colors.name))];
     const color_mean mean;
     color_mean::sums sums{};
@@ -63,39 +63,45 @@ void keep_part(sparse_volume& v, const glm::ivec3& offset, const glm::ivec3& ext
     if (kept != 0) v.offsets[kept] = rank;
 }
 
-void add_filled(sparse_volume& solid, sparse_volume& surface, std::string_view name, const solid_request& request) {
+fill_values fill_of(const sparse_volume& surface, target id, const solid_request& request, const body_map* bodies) {
+    return {id, request, bodies, [&] { return mean_of(*surface.find(info_of(id).name), request); }};
+}
+
+void add_filled(sparse_volume& solid, sparse_volume& surface, std::string_view name, const fill_values& inside) {
     channel from;
     for (channel& c : surface.channels)
         if (c.name == name) from = std::move(c);
     const std::size_t bytes = size_of(from.type) * static_cast<std::size_t>(from.components);
-    std::array<std::byte, 16> inside{};
-    const std::uint32_t empty = empty_value(from);
-    for (std::size_t at = 0; at + 4 <= std::min(bytes, inside.size()); at += 4)
-        std::memcpy(inside.data() + at, &empty, 4);
-    if (name.starts_with("color")) {
-        const rgba8 color = fill_color_of(from, request);
-        std::memcpy(inside.data(), color.data(), 4);
-    }
     channel to{from.name, from.type, from.components, {}};
     to.data.resize(static_cast<std::size_t>(solid.num_values()) * bytes);
     std::byte* at = to.data.data();
     std::size_t s = 0; // bricks of the surface, in step with those of the solid
+    body_map::labels each;
     for (std::size_t b = 0; b < solid.keys.size(); ++b) {
         while (s < surface.keys.size() && surface.keys[s] < solid.keys[b]) ++s;
         const bool both = s < surface.keys.size() && surface.keys[s] == solid.keys[b];
         std::uint64_t rank = both ? surface.offsets[s] : 0;
+        std::optional<std::uint32_t> one = body_map::none;
+        if (!inside.is_one()) one = inside.bodies()->of_brick(solid.keys[b], each);
         for (unsigned w = 0; w < 8; ++w) {
             const std::uint64_t touched = both ? surface.masks[s].words[w] : 0;
             for (std::uint64_t all = solid.masks[b].words[w]; all != 0; all &= all - 1, at += bytes) {
                 const std::uint64_t bit = all & (~all + 1);
                 const auto before = static_cast<unsigned>(std::popcount(touched & (bit - 1)));
                 const bool is_touched = (touched & bit) != 0;
-                std::memcpy(at, is_touched ? from.data.data() + (rank + before) * bytes : inside.data(), bytes);
+                const auto number = 64 * w + static_cast<unsigned>(std::countr_zero(all));
+                const std::byte* const value = is_touched ? from.data.data() + (rank + before) * bytes
+                                                          : inside.of(one ? *one : each[number]).data();
+                std::memcpy(at, value, bytes);
             }
             rank += static_cast<unsigned>(std::popcount(touched));
         }
     }
-    for (std::size_t t = 0; t < solid.tiles.size(); ++t, at += bytes) std::memcpy(at, inside.data(), bytes);
+    for (std::size_t t = 0; t < solid.tiles.size(); ++t, at += bytes) {
+        std::optional<std::uint32_t> one = body_map::none;
+        if (!inside.is_one()) one = inside.bodies()->of_brick(solid.tiles[t].first(), each);
+        std::memcpy(at, inside.of(*one).data(), bytes);
+    }
     solid.channels.push_back(std::move(to));
 }
 

@@ -28,6 +28,7 @@ namespace slabs = voxelpipe::slabs;
 storage_decision choose_storage(storage_choice choice, const voxelize_request& request,
                                 std::span<const std::filesystem::path> outputs, const dense_needs& dense) {
     if (choice == storage_choice::dense) return {};
+    if (request.solid && request.solid->fill == solid_fill::nearest) return {}; // --sparse is refused before
     const auto bricks_alone = std::find_if(outputs.begin(), outputs.end(), is_sparse_format);
     const bool needs_bricks = bricks_alone != outputs.end();
     const auto room = static_cast<double>(memory::room());

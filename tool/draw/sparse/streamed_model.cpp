@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "streamed_model.hpp"
 
+#include "draw/body_fill.hpp"
 #include "model/memory.hpp"
 #include "model/parallel.hpp"
 #include "model/placement.hpp"
@@ -21,6 +22,7 @@
 #include <chrono>
 #include <limits>
 #include <new>
+#include <optional>
 #include <system_error>
 #include <type_traits>
 #include <utility>
@@ -117,6 +119,52 @@ void bin_triangles(triangle_stream& model, const corner_placer& classify, const 
     for (std::size_t s = 0; s < parts.size(); ++s) parts[s].triangles = std::move(bins[s]);
 }
 
+// --fill body: what the draws of a slab need to know of the model's bodies.
+class streamed_bodies {
+public:
+    // Reads the model once more where colours of vertices or textures are asked for, and once for the lids of each
+    // body. Throws as streamed_holes does, and memory_error for a model whose connected parts are asked for.
+    streamed_bodies(triangle_stream& model, const voxelize_request& request, double room,
+                    const std::filesystem::path& folder) {
+        if (!request.solid || request.solid->fill != solid_fill::body) return;
+        const bool wants_colors = request.wants_colors();
+        if (!wants_colors && !request.wants(target::material)) return;
+        fills_ = true;
+        stream_colors colors;
+        if (wants_colors) colors = colors_of(model, request);
+        if (colors.varies && model.parts().size() == 1)
+            throw memory_error(memory::shortage("--fill body needs the connected parts of a model of one draw whose "
+                                                "colours differ, which a streamed model does not have; take --fill "
+                                                "mean or --fill '#rrggbb'"));
+        for (std::size_t p = 0; p < model.parts().size(); ++p)
+            bodies_.push_back({wants_colors ? colors.of_parts[p] : body_color{},
+                               static_cast<std::int32_t>(model.parts()[p].material)});
+        voxelize_request each = request;
+        each.solid->rule = solid_rule::each_draw;
+        each.solid->close_holes = lids_of_bodies(*request.solid);
+        if (each.solid->close_holes == 0) return;
+        holes_.emplace(model, each, room, folder);
+    }
+    [[nodiscard]] bool fills() const { return fills_; }
+    // Parts that a slab has to have for the lids of their bodies.
+    [[nodiscard]] std::vector<std::size_t> parts() const {
+        return holes_ ? holes_->parts() : std::vector<std::size_t>();
+    }
+    // The state that draws of these parts carry on.
+    [[nodiscard]] known_bodies of(std::span<const std::size_t> parts) const {
+        known_bodies made;
+        if (!fills_) return made;
+        for (const std::size_t part : parts) made.bodies.push_back(bodies_[part]);
+        if (holes_) made.cones = holes_->of_bodies(parts);
+        return made;
+    }
+
+private:
+    bool fills_ = false;
+    std::vector<body> bodies_; // by part
+    std::optional<streamed_holes> holes_;
+};
+
 template <class Varyings>
 void draw_streamed_as(triangle_stream& model, const stream_place& place, const voxelize_request& request,
                       const streamed_ranges& ranges, voxelize_stats& stats,
@@ -143,7 +191,8 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
     });
     if (ranges.all.size() == 1) require_streamed(request, surface);
     try {
-        slab_passes passes(request, ranges.all, ranges.drawn, room, place.folder, ranges.kept);
+        slab_passes passes(request, needs_mean(request, model.materials()), ranges.all, ranges.drawn, room,
+                           place.folder, ranges.kept);
         std::vector<bool> is_drawn(ranges.all.size()), is_wanted(ranges.all.size());
         for (const std::size_t r : ranges.drawn) is_drawn[r] = true;
         for (std::size_t r = 0; r < is_wanted.size(); ++r) is_wanted[r] = is_drawn[r] || passes.left_of(r) != 0;
@@ -171,6 +220,7 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
         stats.triangles_flat = counts.triangles_zero_area;
 
         const streamed_holes holes(model, request, room, place.folder);
+        const streamed_bodies bodies(model, request, room, place.folder);
 
         double all = 0;
         for (const auto& part : parts) all += passes.left_of(part.range) + (is_drawn[part.range] ? 1 : 0);
@@ -201,7 +251,8 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
                         report_part(walls);
                         passes.add(pass, draw_walls(scene_of(part, model), walls, part.layers));
                     } else if (drawn_layers(part.layers).size() > 0) {
-                        const voxelize_request slab = request_of(part.layers);
+                        voxelize_request slab = request_of(part.layers);
+                        if (slab.solid) slab.solid->fill = solid_fill::mean; // its surface alone is drawn
                         sparse_drawer of_slab(scene_of(part, model), slab);
                         passes.add(pass, passes.draw(pass, of_slab, slab));
                     }
@@ -218,6 +269,7 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
             for (; s < parts.size() && parts[s].range == r; ++s) {
                 const auto [begin, end] = drawn_layers(parts[s].layers);
                 add_parts(parts[s].parts, holes.parts());
+                add_parts(parts[s].parts, bodies.parts());
                 if (passes.floods()) add_parts(parts[s].parts, {0}); // its inside needs no triangle
                 std::vector<std::size_t> numbers;
                 for (const part_count& c : parts[s].parts) numbers.push_back(c.part);
@@ -236,6 +288,8 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
                 vote.give_to(part);
                 const std::vector<vp::core::hole_cones> cones = holes.of_bodies(numbers);
                 if (!cones.empty()) part.solid->cones = cones.data();
+                const known_bodies of_part_bodies = bodies.of(numbers);
+                if (bodies.fills()) part.solid->bodies = &of_part_bodies;
                 voxelize_stats of_part;
                 of_range.add(sparse_drawer(std::move(of_slab), part).draw(part, of_part));
                 any = true;

@@ -57,6 +57,7 @@ checked_document checker::run() {
     check_samplers();
     check_textures();
     check_materials();
+    choose_variant();
     check_meshes();
     check_nodes_and_scenes();
     check_skins();

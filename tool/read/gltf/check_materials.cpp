@@ -102,6 +102,41 @@ void checker::check_materials() {
     });
 }
 
+// Finds the variant that is asked for among the file's.
+void checker::choose_variant() {
+    const auto extensions = root_.object("extensions");
+    const auto of_file = extensions ? extensions->object("KHR_materials_variants") : std::nullopt;
+    constexpr std::size_t most_named = 20;
+    std::string known;
+    if (of_file)
+        of_file->each_object("variants", [&](const json_at& variant) {
+            const std::string_view name = variant.string("name").value_or("");
+            if (options_.variant && name == *options_.variant && !variant_) variant_ = num_variants_;
+            if (num_variants_ < most_named) known += (num_variants_ == 0 ? "" : ", ") + in_quotes(name);
+            ++num_variants_;
+        });
+    if (num_variants_ > most_named) known += ", ...";
+    if (options_.variant && !variant_)
+        throw gltf_error("there is no material variant " + in_quotes(*options_.variant) +
+                         (num_variants_ == 0 ? ", the file has none" : "; the file has " + known));
+    if (!options_.variant && num_variants_ != 0)
+        tolerance_.warnings().push_back("the file has " + std::to_string(num_variants_) + " material variant(s), " +
+                                        known + ": surfaces have their own materials, --variant chooses one");
+}
+
+// A primitive's mappings from variants to materials; that of the chosen one takes the place of its material.
+void checker::use_variant(const json_at& primitive, const json_at& extension) const {
+    std::optional<std::uint32_t> chosen;
+    extension.each_object("mappings", [&](const json_at& mapping) {
+        const std::uint32_t material =
+            mapping.required("material", mapping.index("material", "materials", num_materials_));
+        mapping.each("variants", [&](const json_at& variant) {
+            if (variant.as_index("variants", num_variants_) == variant_ && !chosen) chosen = material;
+        });
+    });
+    if (chosen) primitive.value()["material"] = *chosen;
+}
+
 // A renderer that knows the extension draws with it alone: its diffuse colour takes the place of the base colour.
 void checker::use_diffuse(const json_at& material, const json_at& extension) const {
     json base = json::object();

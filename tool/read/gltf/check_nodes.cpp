@@ -29,6 +29,7 @@ void checker::check_primitive(const json_at& primitive) {
     check_targets(primitive);
     if (const auto extensions = primitive.object("extensions")) {
         const auto position = attributes.index("POSITION", "accessors", num_accessors_);
+        if (const auto variants = extensions->object("KHR_materials_variants")) use_variant(primitive, *variants);
         const auto draco = extensions->object("KHR_draco_mesh_compression");
         if (draco && (!position || document_.zero_base[*position])) check_draco(primitive, *draco);
     }

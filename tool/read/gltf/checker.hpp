@@ -57,6 +57,8 @@ private:
     void check_samplers();
     void check_textures();
     void check_materials();
+    void choose_variant();
+    void use_variant(const json_at& primitive, const json_at& extension) const;
     void use_diffuse(const json_at& material, const json_at& extension) const;
     void check_texture_info(const json_at& info) const;
 
@@ -83,6 +85,8 @@ private:
     checked_document document_;
     std::vector<view> views_;
     bool placeholder_view_ = false;
+    std::size_t num_variants_ = 0;
+    std::optional<std::size_t> variant_; // that is asked for
     std::size_t num_buffers_ = 0, num_views_ = 0, num_accessors_ = 0, num_images_ = 0, num_samplers_ = 0;
     std::size_t num_textures_ = 0, num_materials_ = 0, num_meshes_ = 0, num_nodes_ = 0, num_scenes_ = 0, num_skins_ = 0;
 };

@@ -28,6 +28,7 @@ enum class extension_effect {
         rule{"KHR_texture_transform", extension_effect::honoured},
         rule{"KHR_mesh_quantization", extension_effect::honoured},
         rule{"KHR_materials_unlit", extension_effect::honoured},
+        rule{"KHR_materials_variants", extension_effect::honoured},
         rule{"KHR_lights_punctual", extension_effect::honoured},
         rule{"KHR_xmp", extension_effect::honoured},
         rule{"KHR_xmp_json_ld", extension_effect::honoured},

@@ -8,6 +8,7 @@
 #include "polygon.hpp"
 #include "read/gltf/budget.hpp"
 #include "read/gltf/resources.hpp"
+#include "stored_vertices.hpp"
 
 #include <algorithm>
 #include <array>
@@ -41,20 +42,27 @@ public:
     mesh_stream(std::unique_ptr<mesh_reader> reader, const std::filesystem::path& file, std::uint64_t room,
                 std::filesystem::path folder, const gltf_limits& limits, const gltf_options& options)
         : reader_(std::move(reader)), file_(file), folder_(std::move(folder)), limits_(limits), options_(options),
-          bytes_(file) {
-        read_vertices();
+          vertices_(file, folder_) {
+        const mesh_description& read = reader_->description();
+        has_vertex_colors_ = read.has_vertex_colors && options_.colors;
+        has_vertex_texcoords_ = read.has_vertex_texcoords;
+        has_face_colors_ = read.has_face_colors && options_.colors;
+        has_corner_texcoords_ = read.has_corner_texcoords;
+        vertices_.begin(*reader_, options_.colors, *this);
         if (!reader_->reads_faces_again()) triangles_.emplace(folder_);
         reader_->read_faces(*this);
         finish(room);
     }
 
-    [[nodiscard]] std::uint64_t num_vertices() const override { return shares_ ? num_stored_ : 3 * num_triangles(); }
+    [[nodiscard]] std::uint64_t num_vertices() const override {
+        return shares_ ? vertices_.count() : 3 * num_triangles();
+    }
     [[nodiscard]] double held_bytes() const override {
         const auto value_bytes =
             static_cast<double>((has_colors() ? sizeof(glm::vec4) : 0) + (has_texcoords() ? sizeof(glm::vec2) : 0));
         const double while_read = 48 + value_bytes; // of a vertex
         return 36 * static_cast<double>(num_triangles()) + (36 + value_bytes) * static_cast<double>(num_vertices()) +
-               (shares_ ? 0 : while_read * static_cast<double>(num_stored_) / 2);
+               (shares_ ? 0 : while_read * static_cast<double>(vertices_.count()) / 2);
     }
     [[nodiscard]] bool has_colors() const override { return has_colors_; }
     void read_part(std::size_t part, const visitor& visit) override;
@@ -68,17 +76,12 @@ private:
 
     [[nodiscard]] std::optional<std::uint64_t> count_not_finite() override {
         if (!shares_) return std::nullopt;
-        if (in_place_) return voxelize::count_not_finite(positions_, bytes_);
-        return voxelize::count_not_finite(positions_, *vertices_);
+        return vertices_.count_not_finite();
     }
 
     // ---- What the reader gives
-    void vertex(const mesh_vertex& v) override;
-    void texcoord(const glm::vec2& value) override {
-        if (!list_) list_.emplace(folder_);
-        list_->append(as_stored(value));
-        ++num_texcoords_;
-    }
+    void vertex(const mesh_vertex& v) override { vertices_.add(v); }
+    void texcoord(const glm::vec2& value) override { vertices_.add_texcoord(value); }
     void face(const mesh_face& f) override;
     void line(std::uint32_t, std::span<const std::uint32_t>) override {
         throw refusal("it has lines or points, which are not streamed");
@@ -86,39 +89,22 @@ private:
     void triangle(const mesh_face& f, const mesh_corner& a, const mesh_corner& b, const mesh_corner& c);
     void own_triangle(const mesh_face& f, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);
 
-    void read_vertices();
     void finish(std::uint64_t room);
-    void open_caches(std::uint64_t room);
-    // Positions alone, for polygons that are cut while the rest is read.
-    void open_positions();
     void read_stored(std::size_t part);
     void add_corner(const mesh_corner& c, const std::optional<glm::vec4>& color);
     void add_position(const glm::vec3& p, const std::optional<glm::vec4>& color);
     void end_triangle();
     void flush();
-    // The value of a cache, from where the vertices are.
-    template <class Cache>
-    [[nodiscard]] const auto& at(Cache& cache, std::uint64_t i) {
-        return in_place_ ? cache->at(i, bytes_) : cache->at(i, *vertices_);
-    }
 
     std::unique_ptr<mesh_reader> reader_;
     std::filesystem::path file_, folder_;
     gltf_limits limits_;
     gltf_options options_;
-    model_bytes bytes_;
-    std::optional<scratch_bytes> vertices_, list_, triangles_; // list_: texture coordinates of corners
-    bool in_place_ = false, shares_ = false, has_colors_ = false;
+    stored_vertices vertices_;
+    std::optional<scratch_bytes> triangles_;
+    bool shares_ = false, has_colors_ = false;
     bool has_vertex_colors_ = false, has_face_colors_ = false, has_vertex_texcoords_ = false,
          has_corner_texcoords_ = false, has_own_positions_ = false;
-    std::uint64_t num_stored_ = 0, num_texcoords_ = 0; // vertices, of the file or of its faces
-    bounding_box box_;
-    position_layout positions_;
-    std::optional<color_layout> colors_;
-    std::optional<texcoord_layout> texcoords_;
-    std::optional<voxelize::position_cache> position_cache_;
-    std::optional<voxelize::color_cache> color_cache_;
-    std::optional<voxelize::texcoord_cache> texcoord_cache_, list_cache_;
     std::vector<run> runs_;
     std::uint64_t num_copied_ = 0;            // triangles in their temporary file
     std::vector<bool> has_any_texcoord_;      // by the reader's part
@@ -126,7 +112,6 @@ private:
     std::vector<std::uint32_t> source_parts_; // of the reader, by part
     assimp::model named_;                     // textures alone
     std::vector<bool> asked_for_;
-    std::uint64_t cut_at_ = 0; // stored vertices when the positions were last opened
     std::vector<glm::dvec3> places_;
     polygon_cutter cut_;
     // The block that is being filled.
@@ -137,93 +122,6 @@ private:
     std::vector<glm::vec4> block_colors_;
     std::vector<glm::vec2> block_texcoords_;
 };
-
-// ---- Vertices
-
-void mesh_stream::vertex(const mesh_vertex& v) {
-    if (reader_->description().is_double) include_position(box_, v.position);
-    ++num_stored_;
-    if (in_place_) return;
-    if (!vertices_) vertices_.emplace(folder_);
-    if (reader_->description().is_double) {
-        vertices_->append(as_stored(v.position));
-    } else {
-        vertices_->append(as_stored(glm::vec3(v.position)));
-    }
-    if (has_vertex_colors_) vertices_->append(as_stored(v.color));
-    if (has_vertex_texcoords_) vertices_->append(as_stored(v.texcoord));
-}
-
-void mesh_stream::read_vertices() {
-    const mesh_description& read = reader_->description();
-    const std::optional<mesh_reader::layouts> placed = reader_->vertices_in_place();
-    in_place_ = placed.has_value();
-    has_vertex_colors_ = read.has_vertex_colors && options_.colors;
-    has_vertex_texcoords_ = read.has_vertex_texcoords;
-    has_face_colors_ = read.has_face_colors && options_.colors;
-    has_corner_texcoords_ = read.has_corner_texcoords;
-    if (!in_place_ || read.is_double) reader_->read_vertices(*this); // floats in place need no look
-    std::size_t stride = 0;
-    if (in_place_) {
-        positions_ = placed->positions;
-        num_stored_ = positions_.count;
-        colors_ = placed->colors;
-        texcoords_ = placed->texcoords;
-    } else {
-        for (std::size_t a = 0; a < 3; ++a) {
-            positions_.is_double[a] = read.is_double;
-            positions_.place[a] = a * (read.is_double ? sizeof(double) : sizeof(float));
-        }
-        stride = read.is_double ? sizeof(glm::dvec3) : sizeof(glm::vec3);
-        if (has_vertex_colors_) {
-            colors_.emplace();
-            for (std::size_t c = 0; c < 4; ++c) colors_->place[c] = stride + c * sizeof(float);
-            colors_->has_alpha = true;
-            stride += sizeof(glm::vec4);
-        }
-        if (has_vertex_texcoords_) {
-            texcoords_.emplace();
-            texcoords_->first = stride;
-            stride += sizeof(glm::vec2);
-        }
-        positions_.stride = stride;
-        if (colors_) colors_->stride = stride;
-        if (texcoords_) texcoords_->stride = stride;
-    }
-    if (texcoords_) texcoords_->transform = upside_down;
-    if (read.is_double) positions_.origin = float_origin(box_);
-}
-
-void mesh_stream::open_positions() {
-    if (position_cache_ && cut_at_ == num_stored_) return;
-    cut_at_ = positions_.count = num_stored_;
-    constexpr std::uint64_t room = std::uint64_t{4} << 20;
-    position_cache_.emplace(positions_, room);
-}
-
-void mesh_stream::open_caches(std::uint64_t room) {
-    const bool has_texcoords = std::any_of(parts_.begin(), parts_.end(), [](const part& p) { return p.has_texcoords; });
-    if (!has_texcoords) texcoords_.reset();
-    const std::uint64_t lists = 1 + (colors_ ? 1 : 0) + (has_texcoords ? 1 : 0);
-    positions_.count = num_stored_;
-    if (reader_->description().is_double) positions_.origin = float_origin(box_); // with vertices of faces
-    position_cache_.emplace(positions_, room / lists);
-    if (colors_) {
-        colors_->count = num_stored_;
-        color_cache_.emplace(*colors_, room / lists);
-    }
-    if (texcoords_) {
-        texcoords_->count = num_stored_;
-        texcoord_cache_.emplace(*texcoords_, room / lists);
-    }
-    if (has_corner_texcoords_ && has_texcoords) {
-        texcoord_layout layout;
-        layout.count = num_texcoords_;
-        layout.stride = sizeof(glm::vec2);
-        layout.transform = upside_down;
-        list_cache_.emplace(layout, room / lists);
-    }
-}
 
 // ---- Faces
 
@@ -247,9 +145,9 @@ void mesh_stream::face(const mesh_face& f) {
         has_any_texcoord_.resize(counts_.size());
         return;
     }
-    if (visit_ == nullptr) open_positions();
+    if (visit_ == nullptr) vertices_.open_positions();
     places_.clear();
-    for (const mesh_corner& c : f.corners) places_.emplace_back(at(position_cache_, c.vertex));
+    for (const mesh_corner& c : f.corners) places_.emplace_back(vertices_.position(c.vertex));
     for (const glm::uvec3& t : cut_.cut(places_)) triangle(f, f.corners[t.x], f.corners[t.y], f.corners[t.z]);
 }
 
@@ -263,7 +161,7 @@ void mesh_stream::own_triangle(const mesh_face& f, const glm::dvec3& a, const gl
     has_own_positions_ = true;
     if (!reader_->reads_faces_again())
         for (std::size_t k = 0; k < 3; ++k) {
-            corners[k].vertex = static_cast<std::uint32_t>(num_stored_);
+            corners[k].vertex = static_cast<std::uint32_t>(vertices_.count());
             mesh_vertex v;
             v.position = k == 0 ? a : k == 1 ? b : c;
             vertex(v);
@@ -314,8 +212,8 @@ void mesh_stream::finish(std::uint64_t room) {
     }
     has_colors_ = has_vertex_colors_ || has_face_colors_;
     shares_ = parts_.size() == 1 && !has_face_colors_ && !(has_corner_texcoords_ && any_texture) && !has_own_positions_;
-    open_caches(room);
-    for (part& p : parts_) p.to_world = translation(positions_.origin);
+    vertices_.open(room, std::any_of(parts_.begin(), parts_.end(), [](const part& p) { return p.has_texcoords; }));
+    for (part& p : parts_) p.to_world = translation(vertices_.origin());
 }
 
 // ---- Blocks
@@ -326,15 +224,15 @@ void mesh_stream::add_position(const glm::vec3& p, const std::optional<glm::vec4
 }
 
 void mesh_stream::add_corner(const mesh_corner& c, const std::optional<glm::vec4>& color) {
-    block_corners_.push_back(at(position_cache_, c.vertex));
+    block_corners_.push_back(vertices_.position(c.vertex));
     if (has_colors_)
-        block_colors_.push_back(color ? *color : color_cache_ ? at(color_cache_, c.vertex) : default_color);
+        block_colors_.push_back(color ? *color : vertices_.has_colors() ? vertices_.color(c.vertex) : default_color);
     if (!parts_[part_].has_texcoords) return;
     if (has_corner_texcoords_)
-        block_texcoords_.push_back(c.texcoord != mesh_corner::none ? list_cache_->at(c.texcoord, *list_)
+        block_texcoords_.push_back(c.texcoord != mesh_corner::none ? vertices_.corner_texcoord(c.texcoord)
                                                                    : turned({0, 0}));
     else
-        block_texcoords_.push_back(at(texcoord_cache_, c.vertex));
+        block_texcoords_.push_back(vertices_.texcoord(c.vertex));
 }
 
 void mesh_stream::end_triangle() {

@@ -326,6 +326,8 @@ void material_list::statement(std::string_view line, const fs::path& library, st
         set_texture(rest, library, false);
     } else if (key == "map_d" || key == "map_opacity") {
         set_texture(rest, library, true);
+    } else if (options_.shading && (key == "map_ke" || key == "map_pr" || key == "map_pm")) {
+        warn(library, number, line, "names a picture of light, roughness or metal, which are not read of an MTL");
     } else if (options_.shading && key == "ke") {
         made.emission = color_in(rest, false).value_or(made.emission);
     } else if (options_.shading && key == "pr") {

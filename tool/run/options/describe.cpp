@@ -72,13 +72,14 @@ void describe_files(CLI::App& app, command_line& options, raw_options& raw) {
     app.add_option("INPUT", options.input,
                    "Model: glTF 2.0 (.glb, .gltf), or .obj, .stl, .ply, .off and others that assimp reads")
         ->option_text(" ");
-    app.add_option("-o,--output", options.outputs, "Write the voxels to FILE (required); one -o for each file")
+    app.add_option("-o,--output", options.outputs,
+                   "Write the voxels to FILE (required); one -o for each file. FORMAT:-, as npy:-, is standard output")
         ->allow_extra_args(false)
         ->option_text("FILE")
         ->group("Output");
     app.add_option("-t,--target", raw.targets,
                    "What to compute for each voxel, see TARGETS; may be repeated. Default: occupancy, with color where "
-                   "an output shows colours (.vox, .schem, .glb, .obj, .ply, .xyz, .png)")
+                   "an output shows colours (.vox, .schem, .litematic, .glb, .obj, .ply, .3mf, .xyz, .png)")
         ->allow_extra_args(false)
         ->delimiter(',')
         ->option_text("NAME")
@@ -159,6 +160,11 @@ void describe_model(CLI::App& app, command_line& options) {
         ->needs(animation)
         ->option_text("T")
         ->group("Model");
+    app.add_option("--variant", options.load.gltf.variant,
+                   "Give the surfaces of a glTF model the materials of this variant of the file, by name "
+                   "(KHR_materials_variants)")
+        ->option_text("NAME")
+        ->group("Model");
     app.add_flag("--lenient", options.load.gltf.lenient,
                  "Go on with a warning where a file breaks the specification in a way that can be put right: unaligned "
                  "data, a node in the scene twice")
@@ -222,9 +228,10 @@ void describe_solids(CLI::App& app, raw_options& raw) {
         ->check(between(0, 64))
         ->option_text("R")
         ->group("Solids");
-    app.add_option("--fill-color", raw.fill_color,
-                   "Colour of the voxels inside: #rrggbb, or mean, that of the surface's voxels. Default: mean")
-        ->option_text("COLOUR")
+    app.add_option("--fill,--fill-color", raw.fill,
+                   "What the voxels inside get: body, the colour and material of the body that they lie in; nearest, "
+                   "those of the nearest triangle; mean, the colour of the surface's voxels; or #rrggbb. Default: body")
+        ->option_text("WHAT")
         ->group("Solids");
 }
 
@@ -358,14 +365,22 @@ void describe_picture(CLI::App& app, command_line& options, raw_options& raw) {
 
 void describe_output(CLI::App& app, command_line& options) {
     add_choice(app, "--up", options.write.up, {{"y", up_axis::y}, {"z", up_axis::z}},
-               "Axis of the model that stands upright in .png, .vox and .schem: y or z. Default: y, as in glTF; many "
+               "Axis of the model that stands upright in .png, .vox, .schem and .litematic: y or z. Default: y, as in "
+               "glTF; many "
                ".stl have z")
         ->option_text("AXIS")
         ->group("Files");
-    app.add_flag("--merge", options.write.merge_faces,
-                 "Join the faces of .glb, .obj, .ply and .stl: coplanar ones of equal colour become one rectangle")
+    app.add_flag(
+           "--merge", options.write.merge_faces,
+           "Join the faces of .glb, .obj, .ply, .stl and .3mf: coplanar ones of equal colour become one rectangle")
         ->group("Files");
     app.add_flag("--points", options.write.points, "Write the centres of the voxels into .ply, not their outer sides")
+        ->group("Files");
+    app.add_option("--blocks", options.block_file,
+                   "Blocks of .schem and .litematic: a file with a block in each line and behind it its colour, "
+                   "#rrggbb, or material and a name: voxels become the block of their material, or of the nearest "
+                   "colour")
+        ->option_text("FILE")
         ->group("Files");
     app.add_flag("--levels", options.write.levels,
                  "Write each value of .zarr with its mip levels, as an OME-Zarr multiscale image")
@@ -382,7 +397,7 @@ void describe_output(CLI::App& app, command_line& options) {
         ->option_text("NAME")
         ->group("Files");
     app.add_option("--compression", options.write.compression,
-                   "Level of .npz, .vti, .nrrd, .zarr and .schem, 0 to 9. Default: 1")
+                   "Level of .npz, .vti, .nrrd, .zarr, .3mf, .schem and .litematic, 0 to 9. Default: 1")
         ->check(between(0, 9))
         ->option_text("N")
         ->group("Files");

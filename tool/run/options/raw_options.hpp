@@ -18,7 +18,7 @@ class App;
 namespace voxelize {
 
 struct raw_options {
-    std::string resolution, origin, voxel_size, extent, image_size, background, fill_color;
+    std::string resolution, origin, voxel_size, extent, image_size, background, fill;
     std::optional<solid_rule> solid;
     std::optional<solid_extent> extent_of_solid;
     std::optional<voxelpipe::coverage> coverage;

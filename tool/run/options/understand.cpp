@@ -3,6 +3,9 @@
 #include "draw/distance/distance_voxelizer.hpp"
 #include "raw_options.hpp"
 #include "values.hpp"
+#include "write/formats/blocks.hpp"
+
+#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
@@ -11,6 +14,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <initializer_list>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -73,6 +77,32 @@ void understand_batch(command_line& options, bool has_world, bool has_rank) {
     check_rank();
 }
 
+namespace {
+
+// --fill, which is --fill-color too.
+void understand_fill(command_line& options, const std::string& text) {
+    solid_request& solid = *options.voxelize.solid;
+    const std::string word = lower(text);
+    if (text.empty() || word == "body") return;
+    if (word == "mean") {
+        solid.fill = solid_fill::mean;
+    } else if (word == "nearest") {
+        solid.fill = solid_fill::nearest;
+        if (options.storage == storage_choice::sparse)
+            throw usage_error(
+                "--fill nearest does not go with --sparse: the nearest triangle is found in a dense grid");
+        if (options.by_slabs)
+            throw usage_error("--fill nearest is one piece of work: no --resume, and no processes that share a model");
+    } else if (const auto color = parse_color(text); color) {
+        solid.fill = solid_fill::color;
+        solid.fill_color = *color;
+    } else {
+        throw usage_error("--fill takes body, nearest, mean or #rrggbb, not \"" + text + '"');
+    }
+}
+
+} // namespace
+
 void understand_solid(command_line& options, const raw_options& raw) {
     if (raw.coverage) options.voxelize.coverage = *raw.coverage;
     if (!raw.solid && !raw.distance) {
@@ -80,7 +110,7 @@ void understand_solid(command_line& options, const raw_options& raw) {
                                                    {"--close-holes", !raw.close_holes.empty()},
                                                    {"--vote", raw.vote},
                                                    {"--closing", raw.closing.has_value()},
-                                                   {"--fill-color", !raw.fill_color.empty()}};
+                                                   {"--fill", !raw.fill.empty()}};
         for (const auto& [name, is_given] : given)
             if (is_given) throw usage_error(std::string(name) + " goes with --solid");
         return;
@@ -114,9 +144,7 @@ void understand_solid(command_line& options, const raw_options& raw) {
                     raw.close_holes + '"');
         }
     }
-    if (raw.fill_color.empty() || lower(raw.fill_color) == "mean") return;
-    solid.fill_color = parse_color(raw.fill_color);
-    if (!solid.fill_color) throw usage_error("--fill-color takes mean or #rrggbb, not \"" + raw.fill_color + '"');
+    understand_fill(options, raw.fill);
 }
 
 void understand_distance(command_line& options, const raw_options& raw) {
@@ -138,8 +166,8 @@ void understand_distance(command_line& options, const raw_options& raw) {
         throw usage_error("--unsigned has no sign that --solid or a repair could decide: leave out one of them");
     if (raw.coverage) throw usage_error("--distance and --coverage do not go together: distances cover every sample");
     if (raw.extent_of_solid) throw usage_error("--solid-extent does not go with --distance: a sample is inside or not");
-    if (!raw.fill_color.empty())
-        throw usage_error("--fill-color does not go with --distance: colours are those of the nearest triangle");
+    if (!raw.fill.empty())
+        throw usage_error("--fill does not go with --distance: colours are those of the nearest triangle");
     if (raw.iso && !std::isfinite(*raw.iso)) throw usage_error("--iso takes a finite distance");
     if (!raw.band.empty()) {
         distance.is_whole = lower(raw.band) == "whole";
@@ -157,7 +185,7 @@ void understand_distance(command_line& options, const raw_options& raw) {
     if (options.write.levels) throw usage_error("--levels does not go with --distance: distances have no mip levels");
     if (options.write.pieces != 0)
         for (const std::filesystem::path& output : options.outputs)
-            if (lower(output.extension().string()) == ".nvdb")
+            if (lower_extension(output) == ".nvdb")
                 throw usage_error("--pieces does not go with --distance and .nvdb: a level set is one grid");
 }
 
@@ -192,13 +220,23 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     bool shows_colors = false;
     bool needs_occupancy = false;
     for (const std::filesystem::path& output : options.outputs) {
+        if (output == "-") throw usage_error("-o -: standard output needs its format before a colon, as in -o npy:-");
         const format* found = find_format(output);
-        if (found == nullptr && lower(output.extension().string()) == ".vdb")
+        if (found == nullptr && lower_extension(output) == ".vdb")
             throw usage_error("\"" + output.string() +
                               "\": this program was built without OpenVDB (libopenvdb-dev); .nvdb needs no library");
         if (found == nullptr) {
             throw usage_error("\"" + output.string() + "\": the extension of an output must be one of " +
                               names(formats(), &format::extension));
+        }
+        if (is_standard_output(output)) {
+            if (std::count_if(options.outputs.begin(), options.outputs.end(), is_standard_output) > 1)
+                throw usage_error("\"" + output.string() + "\": standard output takes one output");
+            if (const std::string_view why = why_no_stream(*found); !why.empty())
+                throw usage_error("\"" + output.string() + "\": " + std::string(found->extension) +
+                                  " cannot go to standard output: " + std::string(why));
+            if (isatty(STDOUT_FILENO) != 0)
+                throw usage_error("\"" + output.string() + "\": standard output is a terminal; redirect it");
         }
         if (std::count(options.outputs.begin(), options.outputs.end(), output) > 1)
             throw usage_error("\"" + output.string() + "\" is given twice");
@@ -213,11 +251,19 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     const auto require = [&](bool given, const char* option, const char* what, const char* who, bool format::*has) {
         if (given && std::none_of(options.outputs.begin(), options.outputs.end(),
                                   [&](const auto& output) { return find_format(output)->*has; }))
-            throw usage_error(std::string(option) + ": " + lower(options.outputs.front().extension().string()) +
-                              " has no " + what + "; " + who);
+            throw usage_error(std::string(option) + ": " + lower_extension(options.outputs.front()) + " has no " +
+                              what + "; " + who);
     };
     require(options.write.levels, "--levels", "levels", ".zarr has", &format::has_levels);
     require(options.write.pieces != 0, "--pieces", "pieces", ".pvti and .nvdb have", &format::has_pieces);
+    require(!options.block_file.empty(), "--blocks", "blocks", ".schem and .litematic have", &format::has_blocks);
+    if (!options.block_file.empty()) {
+        try {
+            options.blocks = std::make_shared<block_list>(read_block_list(options.block_file));
+        } catch (const block_list_error& error) {
+            throw usage_error(std::string("--blocks ") + error.what());
+        }
+    }
     if (options.max_memory != 0)
         options.write.piece_bytes = std::min(options.write.piece_bytes, options.max_memory / 4);
     std::vector<target>& targets = options.voxelize.targets;
@@ -233,12 +279,17 @@ void understand_outputs(command_line& options, const raw_options& raw) {
                               "depth and nearest, those of the nearest triangle");
         if (std::find(targets.begin(), targets.end(), *id) == targets.end()) targets.push_back(*id);
     }
+    // What a picture shows (find_shown() of preview.hpp): colours, or else the first of the other values.
+    const auto has_values = [](target id) { return id != target::occupancy && id != target::distance; };
+    const auto pictured = std::find_if(targets.begin(), targets.end(), has_values);
+    const bool shows_values = !raw.no_color && std::none_of(targets.begin(), targets.end(), is_color);
     for (const target id : targets) {
         const std::string_view name = info_of(id).name;
         const bool held = std::any_of(options.outputs.begin(), options.outputs.end(), [&](const auto& output) {
             const format* const found = find_format(output);
             return id == target::occupancy || id == target::distance || found->all_channels ||
-                   (found->shows_colors && is_color(id));
+                   (found->shows_colors && is_color(id)) ||
+                   (found->extension == ".png" && shows_values && id == *pictured);
         });
         if (!held)
             options.warnings.push_back("--target " + std::string(name) +
@@ -253,6 +304,9 @@ void understand_outputs(command_line& options, const raw_options& raw) {
         targets.push_back(target::occupancy);
         if (shows_colors && !raw.no_color) options.implied.push_back(target::color);
     }
+    if (options.blocks && !options.blocks->materials.empty() &&
+        std::find(targets.begin(), targets.end(), target::material) == targets.end())
+        options.implied.push_back(target::material);
     if (needs_occupancy && std::find(targets.begin(), targets.end(), target::occupancy) == targets.end())
         options.implied.push_back(target::occupancy);
     targets.insert(targets.end(), options.implied.begin(), options.implied.end());

@@ -4,6 +4,7 @@
 #include "formats.hpp"
 
 #include "binvox.hpp"
+#include "litematic.hpp"
 #include "mesh.hpp"
 #include "npy.hpp"
 #include "npz.hpp"
@@ -19,6 +20,7 @@
 #include "write/page/page.hpp"
 #include "write/sparse_formats.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -40,7 +42,9 @@ constexpr auto all_formats = std::to_array<format>({
     {".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several", false, true, false, false},
     {".npz", "NumPy archive with one array for each channel", false, true, false, false},
     {".vox", "MagicaVoxel model, split above 256 voxels, 255 colours", true, false, true, true},
-    {".schem", "Minecraft schematic (Sponge 2, WorldEdit) of concrete, wool, terracotta", true, false, true, true},
+    {".schem", "Minecraft schematic (Sponge 2, WorldEdit) of concrete, wool, terracotta, or see --blocks", true, false,
+     true, true, false, false, false, true},
+    {".litematic", "the same blocks for Litematica", true, false, true, true, false, false, false, true},
     {".binvox", "binvox occupancy, padded to a cube", true, false, false, true},
     {".vti", "VTK image data for ParaView, all channels as cell data", false, true, false, false},
     {".pvti", "the same in pieces of some layers each, OUT.1.vti, ...; see --pieces", false, true, false, false, false,
@@ -52,6 +56,8 @@ constexpr auto all_formats = std::to_array<format>({
     {".obj", "the same as a Wavefront OBJ of quads, colours at the vertices", true, false, true, false},
     {".ply", "the same as a PLY of quads; with --points the centres of the voxels", true, false, true, false},
     {".stl", "the same as a binary STL of triangles, without colours", true, false, false, false},
+    {".3mf", "the same as a 3MF of triangles for printing, in millimetres, colours of the faces", true, false, true,
+     false},
     {".xyz", "centres of the voxels as text: x y z and red green blue, 0 to 255", true, false, true, false},
     {".png", "shaded picture of the voxels", true, false, true, false},
     {".html", "a page that shows the voxels in a browser: turn, cut, choose values", true, true, true, false},
@@ -66,6 +72,7 @@ constexpr auto all_writers = std::to_array<writer>({
     {write_npz},
     {nullptr, write_vox},
     {nullptr, write_schem},
+    {nullptr, write_litematic},
     {nullptr, write_binvox},
     {write_vti},
     {write_pvti, nullptr, pvti_names},
@@ -75,6 +82,7 @@ constexpr auto all_writers = std::to_array<writer>({
     {nullptr, write_obj, mesh_names},
     {nullptr, write_ply, mesh_names},
     {nullptr, write_stl, mesh_names},
+    {nullptr, write_3mf, mesh_names},
     {nullptr, write_xyz},
     {write_png},
     {write_page},
@@ -116,6 +124,14 @@ const format* find_format(const std::filesystem::path& path) {
     for (const format& f : all_formats)
         if (f.extension == extension) return &f;
     return nullptr;
+}
+
+std::string_view why_no_stream(const format& f) {
+    constexpr std::array<std::string_view, 4> seek{".npz", ".vti", ".3mf", ".vdb"};
+    if (std::find(seek.begin(), seek.end(), f.extension) != seek.end())
+        return "it has what is known only at the end before what comes earlier";
+    if (f.extension == ".pvti" || f.extension == ".zarr") return "it is several files";
+    return {};
 }
 
 std::vector<std::filesystem::path> write(const volume& v, const std::filesystem::path& path,

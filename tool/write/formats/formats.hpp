@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,21 +21,26 @@
 
 namespace voxelize {
 
+struct block_list; // blocks.hpp
+
 struct write_options {
-    int compression = 1; // zlib level of .npz, .vti, .nrrd, .zarr, .schem: 0 stores (.schem: 1), 9 is smallest
+    // zlib level of .npz, .vti, .nrrd, .zarr, .3mf, .schem, .litematic: 0 stores (the last two: 1), 9 is smallest
+    int compression = 1;
     bool zstd = false;   // .zarr: Zstandard instead of gzip, where has_zstd()
     bool levels = false; // .zarr: each channel with its mip levels, an OME-Zarr multiscale group
     int pieces = 0;      // .pvti, .nvdb: slabs along z, each a piece or a grid of each channel; 0: as these say:
     std::uint64_t piece_bytes = 1 << 30;         // .pvti: of values in a piece, about
     std::uint64_t leaves_per_grid = 0xffff'ffff; // .nvdb: most bricks in a grid; the format has no more
-    up_axis up = up_axis::y;                     // which world axis stands upright in .vox and .schem; glTF's is y
+    up_axis up = up_axis::y;                     // stands upright in .vox, .schem, .litematic; glTF's is y
     int threads = 0;                             // 0 takes all cores. No output depends on it
-    bool merge_faces = false;             // .ply, .obj, .glb, .stl: coplanar faces of equal colour become one rectangle
-    bool points = false;                  // .ply holds the voxels' centres, not their outer sides
-    bool lists = true;                    // .npy, .npz of a sparse volume list its voxels; false: they hold the grid
-    std::uint64_t faces_per_file = 0;     // .ply, .obj, .glb, .stl: most faces in a file; 0: what the format can number
-    preview_options preview;              // camera and light of .png
-    std::function<void(double)> progress; // called with 0..1 now and then, from the calling thread; may be empty
+    bool merge_faces = false; // .ply, .obj, .glb, .stl, .3mf: coplanar faces of equal colour become one rectangle
+    bool points = false;      // .ply holds the voxels' centres, not their outer sides
+    bool lists = true;        // .npy, .npz of a sparse volume list its voxels; false: they hold the grid
+    std::uint64_t faces_per_file =
+        0;                   // .ply, .obj, .glb, .stl, .3mf: most faces in a file; 0: what the format can number
+    preview_options preview; // camera and light of .png
+    std::shared_ptr<const block_list> blocks; // .schem, .litematic: what voxels become; null: default_blocks()
+    std::function<void(double)> progress;     // called with 0..1 now and then, from the calling thread; may be empty
     // Called with a line that names the file, where it is written but readers of its format do not show all of it; from
     // the calling thread; may be empty.
     std::function<void(const std::string&)> warn;
@@ -51,6 +57,7 @@ struct format {
     bool only_sparse = false;     // holds the voxels that are occupied and no others
     bool has_levels = false;      // obeys write_options::levels
     bool has_pieces = false;      // obeys write_options::pieces
+    bool has_blocks = false;      // obeys write_options::blocks
 };
 
 // True if voxels of this size are cubes, but for what fitting a grid loses by rounding.
@@ -61,6 +68,9 @@ struct format {
 
 // In the order in which --help lists them.
 [[nodiscard]] std::span<const format> formats();
+
+// Why files of the format cannot go to standard output: "it ..."; empty if they can.
+[[nodiscard]] std::string_view why_no_stream(const format& f);
 
 // By the extension of the path, in either case; null when no writer has it.
 [[nodiscard]] const format* find_format(const std::filesystem::path& path);

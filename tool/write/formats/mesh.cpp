@@ -3,95 +3,18 @@
 
 #include "mesh.hpp"
 
+#include "mesh_parts.hpp"
 #include "model/parallel.hpp"
-#include "progress.hpp"
-#include "stl.hpp"
-#include "text.hpp"
-#include "voxel_mesh.hpp"
 #include "write_items.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <memory>
+#include <optional>
+#include <string_view>
 
 namespace voxelize {
 namespace {
-
-constexpr std::uint64_t max_faces = std::uint64_t{1} << 30; // four corners each, numbered with 32 bits
-constexpr std::uint64_t max_glb_faces = 40'000'000;         // of at most 104 bytes each in a file of 4 GiB
-
-std::uint8_t red(std::uint32_t rgb) { return static_cast<std::uint8_t>(rgb); }
-std::uint8_t green(std::uint32_t rgb) { return static_cast<std::uint8_t>(rgb >> 8); }
-std::uint8_t blue(std::uint32_t rgb) { return static_cast<std::uint8_t>(rgb >> 16); }
-
-// World coordinate of lattice plane `n` + `part` along an axis.
-double world(const voxel_shape& v, std::size_t axis, double n) {
-    return std::fma(n, v.voxel_size[axis], v.origin[axis]);
-}
-
-// A file of a mesh, and the faces that it holds.
-struct mesh_part {
-    std::filesystem::path path;
-    std::span<const voxel_face> faces;
-};
-std::filesystem::path part_path(const std::filesystem::path& path, std::size_t n) {
-    return with_word(path, std::to_string(n + 1));
-}
-std::vector<mesh_part> split(std::span<const voxel_face> faces, const std::filesystem::path& path, std::uint64_t most) {
-    if (faces.size() <= most) return {{path, faces}};
-    const std::size_t parts = (faces.size() + most - 1) / most;
-    std::vector<mesh_part> result;
-    for (std::size_t n = 0; n < parts; ++n) {
-        const std::size_t begin = faces.size() * n / parts, end = faces.size() * (n + 1) / parts;
-        result.push_back({part_path(path, n), faces.subspan(begin, end - begin)});
-    }
-    return result;
-}
-
-std::uint64_t most_faces(std::uint64_t of_format, const write_options& options) {
-    return options.faces_per_file != 0 ? std::min(of_format, options.faces_per_file) : of_format;
-}
-
-// Finds the faces and hands each part of them to WRITE(output_file&, welded_mesh, progress_meter&); commits all at the
-// end.
-template <class Write>
-std::vector<std::filesystem::path> write_parts(const voxel_shape& v, const std::filesystem::path& path,
-                                               const write_options& options, std::uint64_t most, const Write& write,
-                                               bool has_colors = true) {
-    most = most_faces(most, options);
-    auto probe = std::make_unique<output_file>(path); // a path that cannot be written costs no work
-    std::function<void(double)> first_half, second_half;
-    if (options.progress) {
-        first_half = [&](double done) { options.progress(0.5 * done); };
-        second_half = [&](double done) { options.progress(0.5 + 0.5 * done); };
-    }
-    const std::vector<voxel_face> faces = voxel_faces(v, options.merge_faces, options.threads, first_half, has_colors);
-    const std::vector<mesh_part> parts = split(faces, path, most);
-    progress_meter meter(second_half, 2 * static_cast<std::uint64_t>(faces.size())); // about one vertex a face
-    std::vector<std::unique_ptr<output_file>> files;
-    for (const mesh_part& part : parts) {
-        if (parts.size() == 1)
-            files.push_back(std::move(probe));
-        else
-            files.push_back(std::make_unique<output_file>(part.path));
-        write(*files.back(), weld(part.faces, v.extent, options.threads), meter);
-    }
-    return commit_all(files);
-}
-
-// Decimal text of every lattice coordinate, made once.
-struct coordinate_texts {
-    std::array<std::vector<std::string>, 3> of_axis;
-
-    coordinate_texts(const voxel_shape& v, double shift, std::int64_t more) {
-        for (std::size_t a = 0; a < 3; ++a)
-            for (std::int64_t n = 0; n < v.extent[a] + more; ++n)
-                of_axis[a].push_back(number(world(v, a, static_cast<double>(n) + shift)));
-    }
-    void append(std::string& out, std::size_t x, std::size_t y, std::size_t z) const {
-        out.append(of_axis[0][x]).append(1, ' ').append(of_axis[1][y]).append(1, ' ').append(of_axis[2][z]);
-    }
-};
 
 // Decimal text of b / 255, short but exact enough to give b back.
 std::string fraction_text(int b) {
@@ -120,11 +43,12 @@ void write_voxels(output_file& out, const voxel_shape& v, const write_options& o
         });
 }
 
+// Colours are those of the faces where there are any, otherwise of the vertices.
 std::string ply_header(std::uint64_t vertices, bool colored, std::optional<std::size_t> faces) {
     std::string text = "ply\nformat binary_little_endian 1.0\ncomment made by voxelize\nelement vertex " +
                        std::to_string(vertices) + "\nproperty double x\nproperty double y\nproperty double z\n";
-    if (colored) text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
     if (faces) text += "element face " + std::to_string(*faces) + "\nproperty list uchar uint vertex_indices\n";
+    if (colored) text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
     return text + "end_header\n";
 }
 
@@ -236,7 +160,7 @@ void write_glb_part(output_file& out, const voxel_shape& v, const welded_mesh& m
     if (colored) {
         const auto linear = linear_table();
         write_items(out, mesh.vertices.size(), options.threads, meter, [&](std::string& text, std::size_t n) {
-            const std::uint32_t rgb = mesh.vertices[n].rgb;
+            const std::uint32_t rgb = mesh.vertices[n].rgb_and_sheet;
             for (const std::uint8_t c : {red(rgb), green(rgb), blue(rgb)}) put(text, linear[c]);
             put(text, std::uint16_t{65535});
         });
@@ -247,17 +171,18 @@ void write_glb_part(output_file& out, const voxel_shape& v, const welded_mesh& m
     });
 }
 
-// True if two neighbouring planes of the lattice become one as floats.
-bool floats_merge_planes(const voxel_shape& v) {
-    for (std::size_t a = 0; a < 3; ++a)
-        for (std::int64_t n = 0; n < v.extent[a]; ++n) {
-            const auto here = static_cast<float>(world(v, a, static_cast<double>(n)));
-            if (here == static_cast<float>(world(v, a, static_cast<double>(n + 1)))) return true;
-        }
-    return false;
-}
-
 } // namespace
+
+std::vector<file_part> split(std::span<const voxel_face> faces, const std::filesystem::path& path, std::uint64_t most) {
+    if (faces.size() <= most) return {{path, faces}};
+    const std::size_t parts = (faces.size() + most - 1) / most;
+    std::vector<file_part> result;
+    for (std::size_t n = 0; n < parts; ++n) {
+        const std::size_t begin = faces.size() * n / parts, end = faces.size() * (n + 1) / parts;
+        result.push_back({with_word(path, std::to_string(n + 1)), faces.subspan(begin, end - begin)});
+    }
+    return result;
+}
 
 written_names mesh_names(const volume& shape, const std::filesystem::path& path, const write_options& options,
                          held_as) {
@@ -269,8 +194,11 @@ written_names mesh_names(const volume& shape, const std::filesystem::path& path,
     for (std::size_t a = 0; a < 3; ++a)
         faces += static_cast<double>(shape.extent[a] + 1) * static_cast<double>(shape.extent[(a + 1) % 3]) *
                  static_cast<double>(shape.extent[(a + 2) % 3]);
-    const auto most = static_cast<double>(most_faces(extension == ".glb" ? max_glb_faces : max_faces, options));
-    if (faces > most)
+    const std::uint64_t of_format = extension == ".glb"   ? max_glb_faces
+                                    : extension == ".3mf" ? max_3mf_faces
+                                                          : max_faces;
+    const auto most = static_cast<double>(most_faces(of_format, options));
+    if (faces > most && !is_standard_output(path))
         names.numbered.push_back({path.parent_path(), path.stem().string() + ".", path.extension().string(),
                                   static_cast<std::uint64_t>(std::ceil(faces / most))});
     return names;
@@ -281,16 +209,16 @@ std::vector<std::filesystem::path> write_ply(const voxel_shape& v, const std::fi
     if (options.points) return write_ply_points(v, path, options);
     const bool colored = v.colored();
     return write_parts(
-        v, path, options, max_faces, [&](output_file& out, const welded_mesh& mesh, progress_meter& meter) {
+        v, path, options, max_faces, [&](output_file& out, std::span<const voxel_face> faces, progress_meter& meter) {
+            const welded_mesh mesh = weld(faces, v.extent, options.threads, false);
             out.write(ply_header(mesh.vertices.size(), colored, mesh.quads.size()));
             write_items(out, mesh.vertices.size(), options.threads, meter, [&](std::string& text, std::size_t n) {
-                const welded_mesh::vertex& vertex = mesh.vertices[n];
-                for (std::size_t a = 0; a < 3; ++a) put(text, world(v, a, vertex.corner[a]));
-                if (colored) put_color(text, vertex.rgb);
+                for (std::size_t a = 0; a < 3; ++a) put(text, world(v, a, mesh.vertices[n].corner[a]));
             });
             write_items(out, mesh.quads.size(), options.threads, meter, [&](std::string& text, std::size_t n) {
                 put(text, std::uint8_t{4});
                 for (const std::uint32_t index : mesh.quads[n]) put(text, index);
+                if (colored) put_color(text, faces[n].rgb);
             });
         });
 }
@@ -303,7 +231,8 @@ std::vector<std::filesystem::path> write_obj(const voxel_shape& v, const std::fi
     fractions.reserve(256);
     for (int b = 0; b < 256; ++b) fractions.push_back(fraction_text(b));
     return write_parts(
-        v, path, options, max_faces, [&](output_file& out, const welded_mesh& mesh, progress_meter& meter) {
+        v, path, options, max_faces, [&](output_file& out, std::span<const voxel_face> faces, progress_meter& meter) {
+            const welded_mesh mesh = weld(faces, v.extent, options.threads);
             out.write("# made by voxelize\no voxels\n");
             write_items(out, mesh.vertices.size(), options.threads, meter, [&](std::string& text, std::size_t n) {
                 const auto& [corner, rgb] = mesh.vertices[n];
@@ -326,30 +255,9 @@ std::vector<std::filesystem::path> write_obj(const voxel_shape& v, const std::fi
 std::vector<std::filesystem::path> write_glb(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options) {
     return write_parts(v, path, options, max_glb_faces,
-                       [&](output_file& out, const welded_mesh& mesh, progress_meter& meter) {
-                           write_glb_part(out, v, mesh, options, meter);
+                       [&](output_file& out, std::span<const voxel_face> faces, progress_meter& meter) {
+                           write_glb_part(out, v, weld(faces, v.extent, options.threads), options, meter);
                        });
-}
-
-std::vector<std::filesystem::path> write_stl(const voxel_shape& v, const std::filesystem::path& path,
-                                             const write_options& options) {
-    if (options.warn && floats_merge_planes(v))
-        options.warn(path.string() + ": the floats of .stl cannot tell neighbouring corners of this grid apart, which "
-                                     "is far from 0 for its voxel size; .ply and .obj can");
-    return write_parts(
-        v, path, options, max_faces,
-        [&](output_file& out, const welded_mesh& mesh, progress_meter& meter) {
-            write_stl_triangles(out, 2 * std::uint64_t{mesh.quads.size()}, options.threads, meter, [&](std::size_t n) {
-                const std::array<std::uint32_t, 4>& quad = mesh.quads[n / 2];
-                stl_triangle triangle{};
-                for (std::size_t c = 0; c < 3; ++c) {
-                    const auto& corner = mesh.vertices[quad[c == 0 ? 0 : c + n % 2]].corner;
-                    for (std::size_t a = 0; a < 3; ++a) triangle[c][a] = world(v, a, corner[a]);
-                }
-                return triangle;
-            });
-        },
-        false);
 }
 
 std::vector<std::filesystem::path> write_xyz(const voxel_shape& v, const std::filesystem::path& path,

@@ -8,6 +8,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <limits>
@@ -28,6 +30,13 @@ int again(int file) { return ::fcntl(file, F_DUPFD_CLOEXEC, 0); }
 
 output_file::output_file(const fs::path& target) : target_(target), real_(target) {
     std::error_code error;
+    if (is_standard_output(target_)) {
+        const int file = again(STDOUT_FILENO);
+        file_ = file < 0 ? nullptr : ::fdopen(file, "wb");
+        if (file_ == nullptr) fail("open", errno);
+        std::setvbuf(file_, nullptr, _IOFBF, buffer_bytes);
+        return;
+    }
     if (fs::is_symlink(target_, error)) {
         const fs::path resolved = fs::weakly_canonical(target_, error);
         if (!error) real_ = resolved;
@@ -108,14 +117,23 @@ std::vector<fs::path> commit_all(std::span<const std::unique_ptr<output_file>> f
     return paths;
 }
 
+bool is_standard_output(const fs::path& path) {
+    const std::string whole = path.string();
+    return whole.size() > 2 && whole.ends_with(":-") &&
+           std::all_of(whole.begin(), whole.end() - 2, [](unsigned char c) { return std::isalnum(c) != 0; });
+}
+
 std::string lower_extension(const std::filesystem::path& path) {
-    std::string extension = path.extension().string();
+    const std::string whole = path.string();
+    std::string extension =
+        is_standard_output(path) ? '.' + whole.substr(0, whole.size() - 2) : path.extension().string();
     for (char& c : extension)
         if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
     return extension;
 }
 
 fs::path with_word(const fs::path& path, const std::string& word) {
+    if (is_standard_output(path)) throw write_error(path, "standard output holds one file, and this is several");
     return path.parent_path() / (path.stem().string() + "." + word + path.extension().string());
 }
 

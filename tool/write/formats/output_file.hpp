@@ -23,7 +23,11 @@ namespace voxelize {
 
 static_assert(std::endian::native == std::endian::little, "the writers copy values in memory order, little end first");
 
-// The path's extension with its dot and in lower case ("A.NPZ": ".npz"), as formats are found by it.
+// True for "npy:-", an output in that format on standard output. A file of this name is "./npy:-".
+[[nodiscard]] bool is_standard_output(const std::filesystem::path& path);
+
+// The path's extension with its dot and in lower case ("A.NPZ": ".npz"), as formats are found by it; of an output on
+// standard output ("npy:-") that of its format.
 [[nodiscard]] std::string lower_extension(const std::filesystem::path& path);
 
 // "out.npy" and "color": "out.color.npy", the name of a file that is one of several of an output.
@@ -33,7 +37,7 @@ class output_file {
 public:
     // Opens a temporary in the folder of `target`. A target that exists and is no regular file (a device, a pipe) is
     // opened itself, since nothing can be renamed over it. A symbolic link is followed and kept. A temporary that a
-    // killed run left is taken.
+    // killed run left is taken. "npy:-" and the like are standard output, which cannot seek.
     explicit output_file(const std::filesystem::path& target);
     ~output_file();
     output_file(const output_file&) = delete;

@@ -7,25 +7,16 @@
 // == z at (i, k, ny-1-j). The format knows neither origin nor voxel size; a grid whose voxel sizes differ from axis to
 // axis is refused, and so is one of more than 32767 voxels along an axis or 2^31 - 1 in all.
 //
-// Colours come from find_colors() (alpha unused): each becomes the concrete, wool or terracotta whose texture has the
-// nearest mean, by squared distance in sRGB; without colours, all voxels are the block nearest to clay.
+// Voxels become blocks as write_options::blocks says, or default_blocks() (blocks.hpp): by their material, or by their
+// colour, which is that of find_colors() (alpha unused); without colours, all voxels are the block nearest to clay.
 
 #include "formats.hpp"
 #include "voxel_shape.hpp"
-#include "write/preview.hpp"
 
-#include <span>
-#include <string_view>
+#include <filesystem>
+#include <vector>
 
 namespace voxelize {
-
-struct block_color {
-    std::string_view name; // without "minecraft:"
-    rgb8 color;            // mean of its texture
-};
-
-// The blocks that voxels become; in a file, block n has the number n + 1, and air is 0.
-[[nodiscard]] std::span<const block_color> schem_blocks();
 
 std::vector<std::filesystem::path> write_schem(const voxel_shape& v, const std::filesystem::path& path,
                                                const write_options& options);

@@ -4,6 +4,7 @@
 #include "voxel_mesh.hpp"
 
 #include "model/parallel.hpp"
+#include "voxel_sheets.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -65,23 +66,113 @@ private:
     std::vector<std::uint32_t> cells_;           // `present` and the colour, or 0; all 0 between calls
 };
 
-// The planes of a brick along an axis: bit 8 * b + a of plane n is the voxel at a along axis + 1 and b along axis + 2.
-using brick_planes = std::array<std::uint64_t, 8>;
+// The voxels of a brick and the two beyond it on every side: bit a + 2 of row [n + 2][b + 2] is the voxel at n along an
+// axis, at a along axis + 1 and at b along axis + 2, each from -2 to 9.
+struct brick_window {
+    std::array<std::array<std::uint16_t, 12>, 12> rows{};
 
-brick_planes planes_of(const voxelpipe::brick_mask& mask, int axis) {
-    brick_planes planes{};
-    for (unsigned n = 0; n < 8; ++n)
-        for (unsigned b = 0; b < 8; ++b) planes[n] |= std::uint64_t{brick_row(mask, axis, n, b)} << 8 * b;
-    return planes;
+    [[nodiscard]] unsigned row(unsigned n, unsigned b) const { return rows[n][b]; }
+    // The eight voxels of the brick itself at n and b, each from -1 to 8.
+    [[nodiscard]] unsigned inner(unsigned n_after_2, unsigned b_after_2) const {
+        return rows[n_after_2][b_after_2] >> 2U & 0xffU;
+    }
+};
+
+// Makes the windows of a row of bricks, column by column.
+class window_row {
+public:
+    // `near`: the bricks of the row and of the eight rows around it: layer below, layer and layer above, each with the
+    // row before, the row and the row after.
+    window_row(const voxel_shape& shape, int axis, std::array<std::span<const brick_order::placed>, 9> near)
+        : shape_(shape), axis_(axis), near_(near) {}
+
+    // Columns ascend from call to call.
+    brick_window at(int column) {
+        for (const int c : {column - 1, column, column + 1}) {
+            column_rows& rows = columns_[static_cast<std::size_t>(c + 3) % 3];
+            if (rows.column != c) read(rows, c);
+        }
+        const column_rows &before = columns_[static_cast<std::size_t>(column + 2) % 3],
+                          &here = columns_[static_cast<std::size_t>(column + 3) % 3],
+                          &after = columns_[static_cast<std::size_t>(column + 4) % 3];
+        brick_window window;
+        for (std::size_t n = 0; n < 12; ++n)
+            for (std::size_t b = 0; b < 12; ++b)
+                window.rows[n][b] = static_cast<std::uint16_t>(before.eight[n][b] >> 6 | here.eight[n][b] << 2 |
+                                                               (after.eight[n][b] & 3U) << 10U);
+        return window;
+    }
+
+private:
+    // The voxels of a column of bricks: eight along axis + 1 in each row of a window.
+    struct column_rows {
+        int column = -2; // no column
+        std::array<std::array<std::uint8_t, 12>, 12> eight{};
+    };
+
+    void read(column_rows& rows, int column) {
+        rows.column = column;
+        rows.eight = {};
+        for (std::size_t k = 0; k < 9; ++k) {
+            std::span<const brick_order::placed>& bricks = near_[k];
+            while (!bricks.empty() && bricks.front().column() < column) bricks = bricks.subspan(1);
+            if (bricks.empty() || bricks.front().column() != column) continue;
+            const voxelpipe::brick_mask& mask = shape_.mask(bricks.front().brick);
+            const range ns = range_of(k / 3), bs = range_of(k % 3);
+            for (unsigned n = ns.begin; n < ns.end; ++n)
+                for (unsigned b = bs.begin; b < bs.end; ++b)
+                    rows.eight[ns.to + n][bs.to + b] = static_cast<std::uint8_t>(brick_row(mask, axis_, n, b));
+        }
+    }
+    // The planes of the brick before this one, of this one, or of the one after, that a window has, and where.
+    struct range {
+        unsigned begin, end, to;
+    };
+    static range range_of(std::size_t which) {
+        constexpr std::array<range, 3> all{range{6, 8, ~0U - 5}, range{0, 8, 2}, range{0, 2, 10}}; // 6 to 0
+        return all[which];
+    }
+
+    const voxel_shape& shape_;
+    int axis_;
+    std::array<std::span<const brick_order::placed>, 9> near_;
+    std::array<column_rows, 3> columns_; // of a column modulo 3
+};
+
+// The sheets of the four corners of the side of the voxel at (n, a, b) of a window's brick: a nibble for each, in the
+// order of corners_of(). `upper`: the side is the one above the voxel.
+std::uint16_t sheets_of_side(const brick_window& window, const voxel_sheets& table, unsigned n, unsigned a, unsigned b,
+                             unsigned upper) {
+    // The voxels around the corner of the lattice at (pn, pa, pb), each from -1 to 9.
+    const auto mask_at = [&](unsigned pn, unsigned pa, unsigned pb) {
+        const auto two = [&](unsigned rn, unsigned rb) { return window.row(rn, rb) >> (pa + 1) & 3U; };
+        return two(pn + 1, pb + 1) | two(pn + 2, pb + 1) << 2U | two(pn + 1, pb + 2) << 4U | two(pn + 2, pb + 2) << 6U;
+    };
+    unsigned sheets = 0;
+    for (unsigned corner = 0; corner < 4; ++corner) {
+        const unsigned db = corner >> 1U, da = (corner & 1U) ^ db; // counter-clockwise
+        std::array<unsigned, 3> at{a + da, n + upper, b + db};
+        const unsigned mask = mask_at(at[1], at[0], at[2]);
+        if (!table.is_special(mask)) continue;
+        bool changes = false;
+        if (const unsigned edge = table.edge_to_change(mask); edge != voxel_sheets::no_edge) {
+            at[edge / 2] += edge % 2 != 0 ? 1U : ~0U;
+            changes = table.edge_to_change(mask_at(at[1], at[0], at[2])) == (edge ^ 1U);
+        }
+        const unsigned place = upper == 0 && corner % 2 == 1 ? 4 - corner : corner; // as seen from outside
+        sheets |= table.sheet(mask, changes, 1 - da, 1 - db) << 4 * place;
+    }
+    return static_cast<std::uint16_t>(sheets);
 }
 
 // The sides across an axis of one layer of bricks, which a thread finds at a time.
 class layer_sides {
 public:
     layer_sides(const voxel_shape& shape, const brick_order& order, int axis,
-                std::span<const brick_order::placed> layer, bool colors)
-        : shape_(shape), order_(order), axis_(axis), colors_(colors), layer_(layer),
-          below_(order.layer_at(layer.front().at() - 1)), above_(order.layer_at(layer.front().at() + 1)) {}
+                std::span<const brick_order::placed> layer, bool colors, bool sheets)
+        : shape_(shape), order_(order), axis_(axis), colors_(colors), sheets_(sheets),
+          layer_(layer), layers_{order.layer_at(layer.front().at() - 1), layer,
+                                 order.layer_at(layer.front().at() + 1)} {}
 
     void append(std::vector<voxel_face>& out, bool merge) {
         brick_order::for_each_row(layer_, [&](std::span<const brick_order::placed> row) { add_row(row); });
@@ -94,78 +185,60 @@ public:
     }
 
 private:
-    // The voxels of each plane of a brick whose neighbour below is empty, and those whose neighbour above is.
-    using exposed_planes = std::array<std::uint64_t, 16>;
-
-    // Planes of the brick beside this one, in a layer whose bricks before it are no longer wanted.
-    brick_planes neighbour(std::span<const brick_order::placed>& layer, const brick_order::placed& of) const {
-        while (!layer.empty() && layer.front().in_layer() < of.in_layer()) layer = layer.subspan(1);
-        if (layer.empty() || layer.front().in_layer() != of.in_layer()) return {};
-        return planes_of(shape_.mask(layer.front().brick), axis_);
-    }
     void add_row(std::span<const brick_order::placed> row) {
-        exposed_.clear();
-        for (const brick_order::placed& p : row) {
-            const brick_planes here = planes_of(shape_.mask(p.brick), axis_), below = neighbour(below_, p),
-                               above = neighbour(above_, p);
-            exposed_planes& exposed = exposed_.emplace_back();
-            for (std::size_t n = 0; n < 8; ++n) {
-                exposed[2 * n] = here[n] & ~(n == 0 ? below[7] : here[n - 1]);
-                exposed[2 * n + 1] = here[n] & ~(n == 7 ? above[0] : here[n + 1]);
-            }
-        }
+        std::array<std::span<const brick_order::placed>, 9> near;
+        for (std::size_t k = 0; k < 9; ++k)
+            near[k] = brick_order::row_of(layers_[k / 3], row.front().row() + static_cast<int>(k % 3) - 1);
+        window_row windows(shape_, axis_, near);
+        windows_.clear();
+        for (const brick_order::placed& p : row) windows_.push_back(windows.at(p.column()));
         for (unsigned b = 0; b < 8; ++b)
             for (std::size_t i = 0; i < row.size(); ++i)
-                for (unsigned n = 0; n < 16; ++n) {
-                    auto bits = static_cast<unsigned>(exposed_[i][n] >> 8 * b & 0xffU);
-                    for (; bits != 0; bits &= bits - 1)
-                        add_side(row[i], n, static_cast<unsigned>(std::countr_zero(bits)), b);
+                for (unsigned n = 0; n < 8; ++n) {
+                    const brick_window& w = windows_[i];
+                    const unsigned here = w.inner(n + 2, b + 2);
+                    add_sides(row[i], w, n, b, 0, here & ~w.inner(n + 1, b + 2));
+                    add_sides(row[i], w, n, b, 1, here & ~w.inner(n + 3, b + 2));
                 }
     }
-    void add_side(const brick_order::placed& p, unsigned n, unsigned a, unsigned b) {
-        const glm::ivec3 voxel = order_.voxel_at(p, n / 2, a, b);
-        voxel_face face;
-        for (int i = 0; i < 3; ++i) face.low[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(voxel[i]);
-        face.low[static_cast<std::size_t>(axis_)] += n % 2; // the plane beyond the voxel
-        if (colors_) face.rgb = shape_.rgb(p.brick, voxel);
-        face.direction = static_cast<std::uint8_t>(2 * static_cast<unsigned>(axis_) + n % 2);
-        planes_[n].push_back(face);
+    // The sides of the voxels of a row, below (0) or above (1) them.
+    void add_sides(const brick_order::placed& p, const brick_window& window, unsigned n, unsigned b, unsigned upper,
+                   unsigned bits) {
+        for (; bits != 0; bits &= bits - 1) {
+            const auto a = static_cast<unsigned>(std::countr_zero(bits));
+            const glm::ivec3 voxel = order_.voxel_at(p, n, a, b);
+            voxel_face face;
+            for (int i = 0; i < 3; ++i) face.low[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(voxel[i]);
+            face.low[static_cast<std::size_t>(axis_)] += upper; // the plane beyond the voxel
+            if (colors_) face.rgb = shape_.rgb(p.brick, voxel);
+            face.direction = static_cast<std::uint8_t>(2 * static_cast<unsigned>(axis_) + upper);
+            if (sheets_) face.sheets = sheets_of_side(window, voxel_sheets::along(axis_), n, a, b, upper);
+            planes_[2 * n + upper].push_back(face);
+        }
     }
 
     const voxel_shape& shape_;
     const brick_order& order_;
     int axis_;
-    bool colors_;
-    std::span<const brick_order::placed> layer_, below_, above_;
-    std::vector<exposed_planes> exposed_;            // of the bricks of a row
-    std::array<std::vector<voxel_face>, 16> planes_; // two directions each
+    bool colors_, sheets_;
+    std::span<const brick_order::placed> layer_;
+    std::array<std::span<const brick_order::placed>, 3> layers_; // below, this, above
+    std::vector<brick_window> windows_;                          // of the bricks of a row
+    std::array<std::vector<voxel_face>, 16> planes_;             // two directions each
 };
 
-// The four corners of a face, counter-clockwise seen from outside.
-std::array<std::array<std::uint32_t, 3>, 4> corners_of(const voxel_face& face) {
-    const std::size_t u = (face.direction / 2U + 1U) % 3U;
-    const std::size_t v = (face.direction / 2U + 2U) % 3U;
-    std::array<std::array<std::uint32_t, 3>, 4> corners{face.low, face.low, face.low, face.low};
-    corners[1][u] += face.size[0];
-    corners[2][u] += face.size[0];
-    corners[2][v] += face.size[1];
-    corners[3][v] += face.size[1];
-    if (face.direction % 2 == 0) std::swap(corners[1], corners[3]); // seen from the low side
-    return corners;
-}
-
-// Numbers the corners of one plane of constant z: for each corner the list of its colours.
+// Numbers the corners of one plane of constant z: for each corner the list of its sheets and colours.
 class plane_welder {
 public:
     plane_welder(std::int64_t nx, std::int64_t ny)
         : width_(static_cast<std::size_t>(nx) + 1), first_(width_ * (static_cast<std::size_t>(ny) + 1), none) {}
 
-    std::uint32_t number_of(const std::array<std::uint32_t, 3>& corner, std::uint32_t rgb) {
+    std::uint32_t number_of(const std::array<std::uint32_t, 3>& corner, std::uint32_t rgb_and_sheet) {
         const std::size_t corner_index = static_cast<std::size_t>(corner[1]) * width_ + corner[0];
         for (std::uint32_t n = first_[corner_index]; n != none; n = next_[n])
-            if (vertices[n].rgb == rgb) return n;
+            if (vertices[n].rgb_and_sheet == rgb_and_sheet) return n;
         const auto number = static_cast<std::uint32_t>(vertices.size());
-        vertices.push_back({corner, rgb});
+        vertices.push_back({corner, rgb_and_sheet});
         next_.push_back(first_[corner_index]);
         first_[corner_index] = number;
         return number;
@@ -189,6 +262,18 @@ private:
 
 } // namespace
 
+std::array<std::array<std::uint32_t, 3>, 4> corners_of(const voxel_face& face) {
+    const std::size_t u = (face.direction / 2U + 1U) % 3U;
+    const std::size_t v = (face.direction / 2U + 2U) % 3U;
+    std::array<std::array<std::uint32_t, 3>, 4> corners{face.low, face.low, face.low, face.low};
+    corners[1][u] += face.size[0];
+    corners[2][u] += face.size[0];
+    corners[2][v] += face.size[1];
+    corners[3][v] += face.size[1];
+    if (face.direction % 2 == 0) std::swap(corners[1], corners[3]); // seen from the low side
+    return corners;
+}
+
 std::vector<voxel_face> voxel_faces(const voxel_shape& shape, bool merge, int threads,
                                     const std::function<void(double)>& progress, bool colors) {
     struct layer_of_axis {
@@ -207,7 +292,7 @@ std::vector<voxel_face> voxel_faces(const voxel_shape& shape, bool merge, int th
         [&](std::size_t n) {
             const auto [axis, layer] = work[n];
             const brick_order& order = orders[static_cast<std::size_t>(axis)];
-            layer_sides(shape, order, axis, order.layer(layer), colors).append(parts[n], merge);
+            layer_sides(shape, order, axis, order.layer(layer), colors, !merge).append(parts[n], merge);
         },
         [&](std::size_t finished) {
             if (progress) progress(static_cast<double>(finished) / static_cast<double>(work.size()));
@@ -223,7 +308,8 @@ std::vector<voxel_face> voxel_faces(const voxel_shape& shape, bool merge, int th
     return faces;
 }
 
-welded_mesh weld(std::span<const voxel_face> faces, const std::array<std::int64_t, 3>& extent, int threads) {
+welded_mesh weld(std::span<const voxel_face> faces, const std::array<std::int64_t, 3>& extent, int threads,
+                 bool splits_colors) {
     // Corners by their z, each as 4 * face + corner.
     const auto planes = static_cast<std::size_t>(extent[2]) + 1;
     std::vector<std::size_t> begin(planes + 1);
@@ -250,7 +336,8 @@ welded_mesh weld(std::span<const voxel_face> faces, const std::array<std::int64_
             for (std::size_t n = begin[z]; n < begin[z + 1]; ++n) {
                 const std::uint32_t id = by_plane[n];
                 const voxel_face& face = faces[id / 4];
-                mesh.quads[id / 4][id % 4] = welder.number_of(corners_of(face)[id % 4], face.rgb);
+                mesh.quads[id / 4][id % 4] = welder.number_of(corners_of(face)[id % 4], (splits_colors ? face.rgb : 0) |
+                                                                                            face.sheet(id % 4) << 24U);
             }
             vertices[z] = welder.take();
         }

@@ -14,6 +14,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <vector>
 
@@ -47,11 +48,15 @@ public:
     [[nodiscard]] bool colored() const { return colors_ != nullptr; }
     // sRGB, red in the low byte; of an occupied voxel of a brick.
     [[nodiscard]] std::uint32_t rgb(std::size_t brick, const glm::ivec3& voxel) const {
-        if (colors_ == nullptr) return clay_rgb_;
-        if (!by_rank_) return rgb_at(static_cast<std::uint64_t>((voxel.z * extent[1] + voxel.y) * extent[0] + voxel.x));
-        const auto bit =
-            static_cast<unsigned>(voxelpipe::core::morton_key(voxel) % voxelpipe::core::sparse_brick_voxels);
-        return rgb_at(bricks_->offsets[brick] + bricks_->masks[brick].before(bit));
+        return colors_ == nullptr ? clay_rgb_ : rgb_at(value_of(brick, voxel));
+    }
+    // True if there are numbers of materials.
+    [[nodiscard]] bool has_materials() const { return materials_ != nullptr; }
+    // Number of the material of an occupied voxel of a brick; -1: no material.
+    [[nodiscard]] std::int32_t material(std::size_t brick, const glm::ivec3& voxel) const {
+        std::int32_t number;
+        std::memcpy(&number, materials_->data.data() + value_of(brick, voxel) * sizeof(number), sizeof(number));
+        return number;
     }
     // Calls visit(rgb) for the voxels of a brick.
     template <class Visit>
@@ -62,6 +67,13 @@ public:
     }
 
 private:
+    // Number of a voxel's value in a channel.
+    [[nodiscard]] std::uint64_t value_of(std::size_t brick, const glm::ivec3& voxel) const {
+        if (!by_rank_) return static_cast<std::uint64_t>((voxel.z * extent[1] + voxel.y) * extent[0] + voxel.x);
+        const auto bit =
+            static_cast<unsigned>(voxelpipe::core::morton_key(voxel) % voxelpipe::core::sparse_brick_voxels);
+        return bricks_->offsets[brick] + bricks_->masks[brick].before(bit);
+    }
     [[nodiscard]] std::uint32_t rgb_at(std::uint64_t value) const {
         const std::byte* at = colors_->data.data() + value * static_cast<std::uint64_t>(colors_->components);
         return std::to_integer<std::uint32_t>(at[0]) | std::to_integer<std::uint32_t>(at[1]) << 8 |
@@ -70,8 +82,8 @@ private:
 
     sparse_volume own_; // of a dense volume
     const sparse_volume* bricks_;
-    const channel* colors_;
-    bool by_rank_; // colours lie in the order of the bricks, not of the grid
+    const channel *colors_, *materials_;
+    bool by_rank_; // values lie in the order of the bricks, not of the grid
     std::uint32_t clay_rgb_;
 };
 

@@ -136,7 +136,7 @@ std::string list_of(const std::array<T, 3>& values) {
 std::string describe(const sparse_volume& v, const std::vector<const channel*>& channels,
                      const std::vector<page_channel>& converted, const std::filesystem::path& path, up_axis up) {
     std::string text = "{\"name\":" + json_string(path.stem().string()) + ",\"extent\":" + list_of(v.shape.extent) +
-                       ",\"voxel_size\":" + list_of(v.shape.voxel_size) +
+                       ",\"voxel_size\":" + list_of(v.shape.voxel_size) + ",\"origin\":" + list_of(v.shape.origin) +
                        ",\"up\":" + (up == up_axis::y ? "\"y\"" : "\"z\"") +
                        ",\"bricks\":" + std::to_string(v.keys.size()) +
                        ",\"voxels\":" + std::to_string(v.num_voxels()) + ",\"channels\":[";
@@ -146,6 +146,20 @@ std::string describe(const sparse_volume& v, const std::vector<const channel*>& 
                 ",\"components\":" + std::to_string(channels[i]->components) + '}';
     }
     return text + "]}";
+}
+
+// page.html around what is put into it.
+struct page_parts {
+    std::string_view before_shape, before_data, after_data;
+};
+
+page_parts split_page() {
+    const std::string_view page = page_text;
+    constexpr std::string_view shape_mark = "/*shape*/", data_mark = "/*data*/";
+    const std::size_t shape_at = page.find(shape_mark), shape_end = shape_at + shape_mark.size();
+    const std::size_t data_at = page.find(data_mark);
+    return {page.substr(0, shape_at), page.substr(shape_end, data_at - shape_end),
+            page.substr(data_at + data_mark.size())};
 }
 
 } // namespace
@@ -179,12 +193,10 @@ std::vector<std::filesystem::path> write_page(const sparse_volume& v, const std:
 
     output_file out(path);
     progress_meter meter(options.progress, total);
-    const std::string_view page = page_text;
-    constexpr std::string_view shape_mark = "/*shape*/", data_mark = "/*data*/";
-    const std::size_t shape_at = page.find(shape_mark), data_at = page.find(data_mark);
-    out.write(page.substr(0, shape_at));
+    const page_parts page = split_page();
+    out.write(page.before_shape);
     out.write(describe(v, channels, converted, path, options.up));
-    out.write(page.substr(shape_at + shape_mark.size(), data_at - shape_at - shape_mark.size()));
+    out.write(page.before_data);
     base64_stream encoded(out);
     piece_compressor compressor(piece_compressor::form::stream_part, std::max(1, options.compression));
     ordered_for(
@@ -195,7 +207,7 @@ std::vector<std::filesystem::path> write_page(const sparse_volume& v, const std:
         });
     encoded.write(deflate_end);
     encoded.finish();
-    out.write(page.substr(data_at + data_mark.size()));
+    out.write(page.after_data);
     out.commit();
     return {path};
 }
@@ -203,6 +215,23 @@ std::vector<std::filesystem::path> write_page(const sparse_volume& v, const std:
 std::vector<std::filesystem::path> write_page(const volume& v, const std::filesystem::path& path,
                                               const write_options& options) {
     return write_page(make_sparse(v, options.threads), path, options);
+}
+
+void write_pages_beside(const std::vector<page_link>& pages, const std::filesystem::path& path) {
+    std::string text =
+        R"({"name":"","extent":[1,1,1],"voxel_size":[1,1,1],"up":"y","bricks":0,"voxels":0,"channels":[],)"
+        R"("pages":[)";
+    for (const page_link& page : pages) {
+        if (&page != &pages.front()) text += ',';
+        text += "{\"name\":" + json_string(page.name) + ",\"file\":" + json_string(page.file.generic_string()) + '}';
+    }
+    output_file out(path);
+    const page_parts page = split_page();
+    out.write(page.before_shape);
+    out.write(text + "]}");
+    out.write(page.before_data);
+    out.write(page.after_data);
+    out.commit();
 }
 
 } // namespace voxelize

@@ -9,6 +9,7 @@
 #include "write/formats/formats.hpp"
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 namespace voxelize {
@@ -18,5 +19,15 @@ std::vector<std::filesystem::path> write_page(const sparse_volume& v, const std:
                                               const write_options& options);
 std::vector<std::filesystem::path> write_page(const volume& v, const std::filesystem::path& path,
                                               const write_options& options);
+
+// A page of voxels, by the name that a reader sees and its file relative to the page that shows it.
+struct page_link {
+    std::string name;
+    std::filesystem::path file;
+};
+
+// Writes a page that shows others side by side, each in a frame; what is turned, cut or chosen in one happens in all.
+// Throws write_error.
+void write_pages_beside(const std::vector<page_link>& pages, const std::filesystem::path& path);
 
 } // namespace voxelize

@@ -8,6 +8,7 @@
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/tuning/tuning_raster.hpp>
 
+#include <cstddef>
 #include <cstdint>
 
 namespace voxelpipe::core {
@@ -21,7 +22,7 @@ public:
     };
 
     // chunks: the lengths of the lists, in chunks; fewer than 2^32 - num_workers in all. num_workers is below 2^29.
-    VOXELPIPE_HD VOXELPIPE_INLINE list_walk(const std::uint32_t (&chunks)[Lists], std::uint32_t worker,
+    VOXELPIPE_HD VOXELPIPE_INLINE list_walk(const std::uint32_t (&chunks)[std::size_t{Lists}], std::uint32_t worker,
                                             std::uint32_t num_workers)
         : at_(worker), step_(num_workers) {
         std::uint32_t all = 0;
@@ -55,7 +56,7 @@ private:
     [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE std::uint32_t begin_of(std::uint32_t part, std::uint32_t chunks) const {
         return static_cast<std::uint32_t>(static_cast<std::uint64_t>(chunks) * part >> part_bits_);
     }
-    std::uint32_t chunks_[Lists];
+    std::uint32_t chunks_[std::size_t{Lists}];
     int part_bits_ = 0;
     // Chunks are numbered in the order of the walk: those of part_ and list_ end at end_, and number n is the list's n
     // + shift_.

@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+"""What wrong arguments say: the argument by name, and what was expected."""
+
+import numpy as np
+import pytest
+import voxelpipe as vp
+
+from meshes import box
+
+MESH = box()
+GRID = vp.fit(MESH, 8)
+V, F = MESH
+NO_TRIANGLES = (np.full((3, 3), np.nan, np.float32), np.array([[0, 1, 2]]))
+RGB = {"rgb": np.zeros((8, 3), np.uint8)}
+
+CASES = [
+    (TypeError, r"grid is a Grid.*not int: voxelize\(mesh, fit\(mesh, 64\)\)", lambda: vp.voxelize(MESH, 64)),
+    (TypeError, "grid is a Grid.*not NoneType", lambda: vp.solid(MESH, None)),
+    (TypeError, "grid is a Grid", lambda: vp.bake(MESH, (8, 8, 8), RGB)),
+    (TypeError, "grid is a Grid", lambda: vp.save("a.npy", np.zeros(GRID.shape), 8)),
+    (ValueError, r"threads is 0 \(all cores\) or more, not -1", lambda: vp.voxelize(MESH, GRID, threads=-1)),
+    (ValueError, "threads", lambda: vp.solid(MESH, GRID, threads=1.5)),
+    (TypeError, "threads is a whole number, not str", lambda: vp.sparse(MESH, GRID, threads="all")),
+    (IndexError, r"triangle 0 is \(0, -1, 2\), the mesh has 4 vertices",
+     lambda: vp.voxelize((V[:4], np.array([[0, -1, 2], [0, 1, 2]])), GRID)),
+    (IndexError, r"triangle 1 is \(0, 7, 2\), the mesh has 4 vertices",
+     lambda: vp.voxelize((V[:4], np.array([[0, 1, 2], [0, 7, 2]], np.uint32)), GRID)),
+    (ValueError, r"resolution is 1 to 2\^20 .*not 1000000000", lambda: vp.fit(MESH, 10**9)),
+    (ValueError, r"resolution is 1 to 2\^20 .*not 0", lambda: vp.fit(MESH, 0)),
+    (ValueError, r"resolution is \(nz, ny, nx\), each from 1 to 2\^20, not \(8, 0, 8\)", lambda: vp.fit(MESH, (8, 0, 8))),
+    (ValueError, r"shape is \(nz, ny, nx\), each from 1 to 2\^20", lambda: vp.Grid((0, 0, 0), (1, 1, 1), (2**21, 1, 1))),
+    (ValueError, "voxel_size is above 0 and finite, not 0", lambda: vp.fit(MESH, voxel_size=0)),
+    (ValueError, "voxel_size is above 0 and finite, not -1", lambda: vp.Grid((0, 0, 0), (1, -1, 1), (1, 1, 1))),
+    (ValueError, "resolution is a whole number, not 12.5", lambda: vp.fit(MESH, 12.5)),
+    (ValueError, "padding is 0 or more", lambda: vp.fit(MESH, voxel_size=0.1, padding=-1)),
+    (ValueError, "no vertex at a finite position", lambda: vp.fit((V[:0], F[:0]), 8)),
+    (ValueError, "no vertex at a finite position", lambda: vp.fit(NO_TRIANGLES, 8)),
+    (ValueError, r"values has the shape \(7, 8, 8\), the grid's is \(8, 8, 8\)",
+     lambda: vp.save("a.png", np.zeros((7, 8, 8), bool), GRID)),
+    (ValueError, r"values has the shape \(7, 8, 8\)", lambda: vp.save("a.npy", np.zeros((7, 8, 8)), GRID)),
+    (ValueError, r"rgb has the shape \(8, 8, 7, 3\)", lambda: vp.view({"rgb": np.zeros((8, 8, 7, 3), np.uint8)}, GRID)),
+    (ValueError, r"occupied has the shape \(1, 8, 8\)",
+     lambda: vp.render(np.zeros(GRID.shape), GRID, occupied=np.zeros((1, 8, 8), bool))),
+    (OSError, "'/nonexistent/x.png'", lambda: vp.save("/nonexistent/x.png", np.zeros(GRID.shape, bool), GRID)),
+    (OSError, "'/nonexistent/x.vox'", lambda: vp.save("/nonexistent/x.vox", np.zeros(GRID.shape, bool), GRID)),
+    (ValueError, "per names no value: 'typo'; there are 'rgb'", lambda: vp.bake(MESH, GRID, RGB, per={"typo": "vertex"})),
+    (ValueError, "blend names no value: 'typo'", lambda: vp.bake(MESH, GRID, RGB, blend={"typo": "max"})),
+    (TypeError, "per is a mapping by name", lambda: vp.bake(MESH, GRID, RGB, per="vertex")),
+    (TypeError, "status is a dict.*not list", lambda: vp.voxelize(MESH, GRID, status=[])),
+    (TypeError, "status is a dict", lambda: vp.distance_at(MESH, V, status=[])),
+    (ValueError, "coverage is one of 'conservative', .*not 3", lambda: vp.voxelize(MESH, GRID, 3)),
+    (ValueError, "repair is one of", lambda: vp.distance(MESH, GRID, repair="holes")),
+    (ValueError, "closing is 0 or more", lambda: vp.solid(MESH, GRID, repair="exterior", closing=-1)),
+    (ValueError, "max_hole_edges is 0 or more", lambda: vp.solid(MESH, GRID, repair="close_holes", max_hole_edges=-1)),
+    (ValueError, "up is one of 'y', 'z', not 'x'", lambda: vp.save("a.html", np.zeros(GRID.shape, bool), GRID, up="x")),
+    (TypeError, "zoom: for .png only", lambda: vp.save("a.npy", np.zeros(GRID.shape), GRID, zoom=2)),
+    (ValueError, "background is 'sky'.*not 'pink'", lambda: vp.render(np.ones(GRID.shape, bool), GRID, background="pink")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind, text, call", CASES, ids=[str(i) for i in range(len(CASES))])
+def test_errors_name_the_argument(kind, text, call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(kind, match=text):
+        call()
+    assert not list(tmp_path.iterdir())
+
+
+def test_both_spellings_of_the_centre():
+    assert np.array_equal(vp.solid(MESH, GRID, extent="center"), vp.solid(MESH, GRID, extent="centre"))
+
+
+def test_a_vertex_at_infinity_is_a_warning():
+    broken = np.concatenate([V, [[np.inf, 0, 0]]]).astype(np.float32)
+    with pytest.warns(vp.DroppedTrianglesWarning, match="1 of 9 vertices are not finite"):
+        assert vp.fit((broken, F), 8) == GRID
+
+
+def test_a_grids_text_gives_the_grid():
+    odd = vp.fit((V * np.float32(1 / 3), F), voxel_size=(0.1, 0.07, 1e-3))
+    for grid in (GRID, odd, odd.crop((1, 2, 0), (3, 2, 1)), vp.Grid((1e-17, 1 / 3, -2e300), (1, 1, 1), (1, 2, 3))):
+        assert eval(repr(grid), {"Grid": vp.Grid}) == grid

@@ -1,0 +1,148 @@
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+"""Types of arguments, and checks whose messages name the argument and what was expected."""
+
+from __future__ import annotations
+
+import operator
+import os
+from typing import Any, List, Literal, Mapping, Protocol, Sequence, Tuple, Union, get_args
+
+import numpy as np
+
+from ._core import Grid
+
+Coverage = Literal["conservative", "thin", "crosshair", "diagonal"]
+Fill = Literal["nonzero", "even_odd", "positive"]
+Sign = Literal["nonzero", "even_odd", "positive", "unsigned"]
+Extent = Literal["outer", "centre", "center", "inner"]
+Repair = Literal["none", "close_holes", "exterior", "vote"]
+Bodies = Literal["all", "each"]
+Blend = Literal["mean", "sum", "min", "max", "last"]
+Per = Literal["vertex", "triangle"]
+Up = Literal["y", "z"]
+# Values that a model has by itself, as the voxelize tool computes them (--target).
+OwnValue = Literal[
+    "occupancy",
+    "count",
+    "color",
+    "color-max",
+    "color-replace",
+    "color-outer",
+    "normal",
+    "material",
+    "triangle",
+    "depth",
+]
+
+
+class TensorLike(Protocol):
+    """A tensor of torch."""
+
+    def detach(self) -> Any: ...
+
+    def requires_grad_(self, requires_grad: bool = ...) -> Any: ...
+
+
+class HasFaces(Protocol):
+    """A mesh of trimesh, or a Model."""
+
+    @property
+    def vertices(self) -> Any: ...
+
+    @property
+    def faces(self) -> Any: ...
+
+
+class HasTriangles(Protocol):
+    """A mesh of Open3D."""
+
+    @property
+    def vertices(self) -> Any: ...
+
+    @property
+    def triangles(self) -> Any: ...
+
+
+class HasTensors(Protocol):
+    """A mesh of Open3D's tensors."""
+
+    @property
+    def vertex(self) -> Any: ...
+
+    @property
+    def triangle(self) -> Any: ...
+
+
+class HasPoints(Protocol):
+    """A mesh of PyVista."""
+
+    @property
+    def points(self) -> Any: ...
+
+    @property
+    def is_all_triangles(self) -> Any: ...
+
+
+class IsScene(Protocol):
+    """A scene of trimesh."""
+
+    @property
+    def geometry(self) -> Any: ...
+
+    @property
+    def graph(self) -> Any: ...
+
+
+TensorMesh = Tuple[TensorLike, TensorLike]
+# Types that functions take as a mesh; see as_mesh.
+MeshLike = Union[
+    Tuple[Any, Any], str, "os.PathLike[str]", HasFaces, HasTriangles, HasTensors, HasPoints, IsScene, List[Any]
+]
+BlendLike = Union[Blend, Mapping[str, Blend], None]
+OwnValues = Union[OwnValue, Sequence[OwnValue], None]
+
+
+def check_choice(what: str, value: Any, choices: Any) -> None:
+    """Raises ValueError that lists the choices of a Literal."""
+    names = get_args(choices)
+    if not isinstance(value, str) or value not in names:
+        raise ValueError(f"{what} is one of {', '.join(map(repr, names))}, not {value!r}")
+
+
+def check_grid(grid: Any, call: str) -> Grid:
+    """Raises TypeError for what is no Grid. `call`: the function, for a hint."""
+    if isinstance(grid, Grid):
+        return grid
+    hint = f": {call}(mesh, fit(mesh, {grid}))" if isinstance(grid, (int, np.integer)) else ""
+    raise TypeError(f"grid is a Grid, as fit() makes it, not {type(grid).__name__}{hint}")
+
+
+def whole_number(what: str, value: Any, least: int = 0, expected: str = "") -> int:
+    """Raises TypeError for what is no whole number, ValueError for one that is too small."""
+    try:
+        n = operator.index(value)
+    except TypeError:
+        if isinstance(value, float):
+            raise ValueError(f"{what} is a whole number, not {value!r}") from None
+        raise TypeError(f"{what} is a whole number, not {type(value).__name__}") from None
+    if n < least:
+        raise ValueError(f"{what} is {expected or f'{least} or more'}, not {n}")
+    return n
+
+
+def check_threads(threads: Any) -> int:
+    return whole_number("threads", threads, 0, "0 (all cores) or more")
+
+
+def check_status(status: Any) -> None:
+    if status is not None and not isinstance(status, dict):
+        raise TypeError(f"status is a dict that is filled with counters, not {type(status).__name__}")
+
+
+def check_call(call: str, grid: Any, coverage: Any, threads: Any, status: Any) -> None:
+    """The arguments that most functions have."""
+    check_grid(grid, call)
+    check_choice("coverage", coverage, Coverage)
+    check_threads(threads)
+    check_status(status)
