@@ -128,6 +128,22 @@ TEST(ToolSparse, SolidsHoldTheVoxelsAndValuesOfADenseRun) {
     }
 }
 
+// The inside of one body is tiles, some of which a surface opens.
+TEST(ToolSparse, CountsOfOneBodyAreThoseOfADenseRun) {
+    const scratch_folder folder;
+    builder file;
+    gltf_test::add_cube(file, {0, 0, 0}, 1, gltf_test::add_material(file, {1, 0, 0, 1}));
+    file.write_glb(folder / "m.glb");
+    const auto draw = [&](const std::string& out, const char* how) {
+        const outcome result = run(folder, {folder / "m.glb", "-q", "-o", folder / out, "-r", "64", "--solid",
+                                            "each_draw", "-t", "count,color", "--compression", "0", how});
+        ASSERT_EQ(0, result.code) << result.err;
+    };
+    draw("d.vti", "--dense");
+    draw("s.vti", "--sparse");
+    EXPECT_TRUE(read_file(folder / "d.vti") == read_file(folder / "s.vti"));
+}
+
 // A picture drawn from bricks, dense files read from them, shapes, and .nvdb by either way.
 TEST(ToolSparse, WritesTheSameFilesAsADenseRun) {
     constexpr const char* extensions[] = {".png", ".nvdb", ".vti", ".vox", ".glb"};
