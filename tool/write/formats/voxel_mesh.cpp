@@ -98,7 +98,7 @@ public:
         brick_window window;
         for (std::size_t n = 0; n < 12; ++n)
             for (std::size_t b = 0; b < 12; ++b)
-                window.rows[n][b] = static_cast<std::uint16_t>(before.eight[n][b] >> 6 | here.eight[n][b] << 2 |
+                window.rows[n][b] = static_cast<std::uint16_t>(before.eight[n][b] >> 6U | here.eight[n][b] * 4U |
                                                                (after.eight[n][b] & 3U) << 10U);
         return window;
     }
