@@ -136,7 +136,7 @@ struct triangles {
     using vertex_type = vertex_output<Varyings>; // what the vertex shader returns
     static constexpr int capacity = N;           // most triangles of one element
 
-    vertex_type vertices[std::size_t{3 * N}]; // three a triangle
+    vertex_type vertices[std::size_t{3} * N]; // three a triangle
     int count = 0;                            // a call fails with bad_count unless this is 0 to N
 
     // Appends a triangle. Beyond N it only counts, and the call fails.

@@ -13,7 +13,7 @@ namespace {
 // between: number 4 d + (place along the lower other axis) + 2 (place along the higher one), across axis d.
 std::size_t side_across(std::size_t d, unsigned voxel) {
     const std::size_t lower = d == 0 ? 1 : 0, higher = d == 2 ? 1 : 2;
-    return 4 * d + (voxel >> lower & 1U) + 2 * (voxel >> higher & 1U);
+    return 4 * d + (voxel >> lower & 1U) + (voxel >> higher & 1U) * std::size_t{2};
 }
 
 // The sheets of a corner.
