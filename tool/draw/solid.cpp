@@ -68,8 +68,9 @@ void set_by_body(const volume& v, const channel& solid, const channel& surface, 
                  const std::array<int, 3>& offset, int threads) {
     constexpr int side = voxelpipe::core::sparse_brick_size;
     const std::size_t bytes = size_of(c.type) * static_cast<std::size_t>(c.components);
-    const int first_layer = offset[2] / side, last_layer = (offset[2] + static_cast<int>(v.extent[2]) - 1) / side;
-    parallel_for(static_cast<std::size_t>(last_layer - first_layer + 1), threads, [&](std::size_t layer) {
+    const int first_layer = offset[2] / side,
+              layers = (offset[2] + static_cast<int>(v.extent[2]) - 1) / side - first_layer + 1;
+    parallel_for(static_cast<std::size_t>(layers), threads, [&](std::size_t layer) {
         const int bz = first_layer + static_cast<int>(layer);
         body_map::labels each;
         glm::ivec3 of_labels(-1); // the brick whose body is known

@@ -254,6 +254,7 @@ void write_page_beside(const command_line& options, const std::vector<listed_mod
     const auto pattern = std::find_if(options.outputs.begin(), options.outputs.end(),
                                       [](const fs::path& output) { return lower_extension(output) == ".html"; });
     std::vector<page_link> links;
+    links.reserve(models.size());
     for (const listed_model& model : models)
         links.push_back({model.name, with_name(*pattern, model.name).lexically_proximate(page.parent_path())});
     write_pages_beside(links, page);
