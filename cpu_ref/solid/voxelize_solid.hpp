@@ -37,8 +37,8 @@ template <class Draw, class Payload>
     });
 }
 
-// Implements diagnose_repair, with validated arguments: lids on the holes of each body of at most so many edges. Throws std::bad_alloc, or
-// std::length_error for more boundary vertices than triangles can name.
+// Implements diagnose_repair, with validated arguments: lids on the holes of each body, of at most max_hole_edges
+// edges. Throws std::bad_alloc, or std::length_error for more boundary vertices than triangles can name.
 template <class Draw>
 [[nodiscard]] std::vector<hole_cones> run_module(find_holes_tag, const cpu_backend& backend,
                                                  std::span<const Draw> draws, const grid& g, bodies each,

@@ -5,7 +5,7 @@
 // The meshes of --remesh as files, in world units and on the world's axes: one object, indexed, closed.
 //
 // Coordinates are doubles in .ply and .npz, shortest decimals of these in .obj and .3mf. A .glb and a .stl hold floats.
-// The place of a vertex in its cell is rounded to so many bits first, at most 16, that vertices of different cells stay
+// The place of a vertex in its cell is first rounded to 16 bits, or to fewer where vertices of different cells stay
 // apart as floats from the grid's low corner: that corner is the translation of a .glb's node. A .stl has no
 // translation: a warning where its floats merge vertices. It has no indices either, and readers join its vertices by
 // position: where vertices of one cell coincide, each moves by 2^-6 towards the mean of its faces' vertices.

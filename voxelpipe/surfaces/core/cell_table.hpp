@@ -29,7 +29,8 @@ struct cell_sheets {
     [[nodiscard]] VOXELPIPE_HD constexpr int of_edge(int e) const { return static_cast<int>(bits >> (4 * e) & 15); }
     // Number of sheets, 0 to 4.
     [[nodiscard]] VOXELPIPE_HD constexpr int count() const { return static_cast<int>(bits >> 48 & 15); }
-    // The ambiguous face both of whose segments lie in one sheet; no cell has two such faces. no_face: there is none.
+    // The ambiguous face both of whose segments lie in one sheet; no cell has two such faces. no_face: the cell has no
+    // such face.
     [[nodiscard]] VOXELPIPE_HD constexpr int joined_face() const { return static_cast<int>(bits >> 52 & 15); }
 };
 

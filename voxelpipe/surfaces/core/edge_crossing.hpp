@@ -19,7 +19,7 @@ struct edge_crossing {
     static constexpr std::uint32_t no_source = ~std::uint32_t{0}; // of a crossing that no triangle makes
     std::uint32_t t = middle;                                     // from the lower sample, in units of 2^-24
     std::uint32_t source = no_source;                             // the primitive
-    float nx = 0.0f, ny = 0.0f, nz = 0.0f; // outward unit normal in units of the samples' spacing; 0: there is none
+    float nx = 0.0f, ny = 0.0f, nz = 0.0f; // outward unit normal in units of the samples' spacing; 0: no normal
 };
 
 // A position on an edge: numerator / denominator from the lower sample, 0 to 1. Below 2^98: the denominator is a

@@ -46,7 +46,7 @@ struct place_vertices {
             if (sources != nullptr) sources[v] = source;
         }
     }
-    // Of an edge of a cell.
+    // The crossing of an edge of a cell.
     [[nodiscard]] VOXELPIPE_HD edge_crossing crossing(const cell_key& at, int e) const {
         if (crossings == nullptr) return {};
         const int corner = edge_corner(e);
