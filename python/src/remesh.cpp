@@ -32,8 +32,8 @@ nb::dict report_surface(const status& s) {
     return d;
 }
 
-// (vertices, faces, cell, sheet, source, counters); source is empty where the surface has none. `world`: the grid of the
-// samples, as vertices are to be placed.
+// (vertices, faces, cell, sheet, source, counters); source is empty where the surface has none. `world`: the grid of
+// the samples, as vertices are to be placed.
 nb::tuple arrays_of(cpu_backend& backend, const surface<cpu_backend>& made, const grid& world, const status& s) {
     std::vector<double> vertices;
     std::vector<std::int32_t> cells;
@@ -65,8 +65,8 @@ nb::tuple arrays_of(cpu_backend& backend, const surface<cpu_backend>& made, cons
 
 // As voxelpipe/_remesh.py has them. Throws ValueError.
 nb::tuple remesh_parts(const position_array& positions, const triangle_array& triangles,
-                       const std::vector<std::uint64_t>& first_triangles, const grid& g, const grid& world, const std::string& sign,
-                       const std::string& repair_name, const std::string& bodies_name,
+                       const std::vector<std::uint64_t>& first_triangles, const grid& g, const grid& world,
+                       const std::string& sign, const std::string& repair_name, const std::string& bodies_name,
                        std::optional<std::uint64_t> max_hole_edges, int closing, const std::string& place_name,
                        double level, bool quads, std::uint32_t min_component, unsigned threads) {
     const solid_options solid = solid_options_named(sign, "outer", repair_name, bodies_name, max_hole_edges, closing);
@@ -139,9 +139,9 @@ nb::tuple extract_field(const array<const float, 3>& values, const grid& g, cons
 
 void bind_remesh(nb::module_& m) {
     m.def("remesh", &remesh_parts, nb::arg("positions"), nb::arg("triangles"), nb::arg("first_triangles"),
-          nb::arg("grid"), nb::arg("world"), nb::arg("sign"), nb::arg("repair"), nb::arg("bodies"), nb::arg("max_hole_edges").none(),
-          nb::arg("closing"), nb::arg("place"), nb::arg("level"), nb::arg("quads"), nb::arg("min_component"),
-          nb::arg("threads"));
+          nb::arg("grid"), nb::arg("world"), nb::arg("sign"), nb::arg("repair"), nb::arg("bodies"),
+          nb::arg("max_hole_edges").none(), nb::arg("closing"), nb::arg("place"), nb::arg("level"), nb::arg("quads"),
+          nb::arg("min_component"), nb::arg("threads"));
     m.def("extract_bits", &extract_bits, nb::arg("values"), nb::arg("grid"), nb::arg("place"), nb::arg("open"),
           nb::arg("quads"), nb::arg("min_component"), nb::arg("threads"));
     m.def("extract_field", &extract_field, nb::arg("values"), nb::arg("grid"), nb::arg("place"), nb::arg("level"),
