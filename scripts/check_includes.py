@@ -7,6 +7,7 @@ The library's parts, from the top down; an include names a file of the same part
 
     slabs
     programs
+    surfaces
     distance
     sparse
     solid
@@ -46,7 +47,7 @@ import re
 import sys
 
 LAYERS = ["", "call", "tiles fragments", "raster", "targets", "scene", "base"]  # of device/, from the top down
-MODULES = ["slabs", "programs", "distance", "sparse", "solid", "levels", "api", "core"]  # of voxelpipe/, from the top down
+MODULES = ["slabs", "programs", "surfaces", "distance", "sparse", "solid", "levels", "api", "core"]  # of voxelpipe/, from the top down
 MAX_LOOSE = 4  # files directly in device/: what a reader meets first
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in (folders.split() or [""])}
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)

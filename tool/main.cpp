@@ -40,7 +40,15 @@ void print(const command_line& options, const run_report& report) {
         std::ostream& stream = options.stats == stats_format::json ? std::cerr : out;
         const glm::ivec3 extent = report.request.grid.extent;
         for (const std::filesystem::path& file : report.files) stream << "wrote " << file.string() << '\n';
-        if (!report.files.empty())
+        if (report.surface) {
+            const voxelpipe::surface_counters& c = report.surface->counts;
+            stream << c.vertices << " vertices and " << c.faces << " faces on a grid of " << extent.x << " x "
+                   << extent.y << " x " << extent.z << '\n';
+            if (report.request.remesh->reports)
+                stream << c.components << (c.components == 1 ? " component" : " components")
+                       << ", Euler characteristic " << report.surface->euler << ", " << c.made_crossings
+                       << " made crossings, " << c.cone_crossings << " crossings on closed holes\n";
+        } else if (!report.files.empty())
             stream << report.stats.voxels << " of " << extent.x << " x " << extent.y << " x " << extent.z
                    << (report.request.distance ? " samples lie in the band\n" : " voxels are covered\n");
         if (report.is_sparse && report.bricks != 0)

@@ -32,6 +32,8 @@ enum class status_code : std::uint8_t {
     strategy_unavailable, // the forced strategy cannot serve the call
     bad_solid_options,    // an option of voxelize_solid is out of its range, or has no meaning with the repair
     bad_distance_options, // an option of voxelize_distance is out of its range, or options contradict each other
+    bad_surface_options,  // an option of extract or remesh is out of its range, or has no meaning with another
+    too_many_vertices,    // a surface of more than 2^32 - 1; surface_counters::vertices says how many, or at least
     bad_level,            // a tessellation program gave a level below 1 or above its max_level
     bad_count,            // a geometry program emitted more triangles than its type holds
     bad_subset,           // mesh_view::part: not one number a triangle, or not ascending below `whole`
@@ -122,6 +124,19 @@ struct distance_counters {
     friend bool operator==(const distance_counters&, const distance_counters&) = default;
 };
 
+// What extract and remesh count besides `counters`; zeros from other calls.
+struct surface_counters {
+    std::uint64_t vertices = 0;            // of the surface
+    std::uint64_t faces = 0;               // triangles, or quads
+    std::uint64_t components = 0;          // connected ones, of those that the surface has
+    std::uint64_t components_left_out = 0; // by extract_options::min_component
+    std::uint64_t cone_crossings = 0;      // edges that the surface crosses on a cone of close_holes
+    std::uint64_t made_crossings = 0;      // edges without a crossing of mesh or field, crossed in their middle
+    std::uint64_t nan_samples = 0;         // of a field, which are outside
+
+    friend bool operator==(const surface_counters&, const surface_counters&) = default;
+};
+
 // Sizes that a caller's workspace or limits must have; set if `code` is capacity_exceeded.
 struct required_sizes {
     std::uint64_t tile_pairs = 0;         // as workspace_limits
@@ -170,6 +185,10 @@ struct required_sizes {
     case status_code::bad_distance_options:
         return "bad distance options: a band that is not above 0, a value out of its range, or a rule or a repair "
                "where no sign is wanted";
+    case status_code::bad_surface_options:
+        return "bad surface options: a value out of its range, or a level or a repair that does not go with the rest";
+    case status_code::too_many_vertices:
+        return "too many vertices: a surface of more than 2^32 - 1";
     case status_code::bad_level:
         return "bad level: a tessellation program's edge_level must be 1 to its max_level";
     case status_code::bad_count:
@@ -221,6 +240,7 @@ struct [[nodiscard]] status {
     counters counts{};                                          // of this call
     solid_counters solid{};                                     // of voxelize_solid, and of a distance's sign
     distance_counters distance{};                               // of voxelize_distance and distance_at
+    surface_counters surface{};                                 // of extract and remesh
     required_sizes required{};                                  // if the capacity did not suffice
     static constexpr std::uint32_t unknown = ~std::uint32_t{0}; // no draw or triangle is named
     std::uint32_t draw = unknown; // of index_out_of_range: the first such triangle and its draw, if voxelize returns

@@ -26,6 +26,8 @@
 #include <voxelpipe/sparse/sparse.hpp>
 #include <voxelpipe/stage_times.hpp>
 #include <voxelpipe/status.hpp>
+#include <voxelpipe/surfaces/extract.hpp>
+#include <voxelpipe/surfaces/remesh.hpp>
 #include <voxelpipe/voxelize.hpp>
 
 #if defined(__CUDACC__)

@@ -37,13 +37,15 @@ template <class Draw, class Payload>
     });
 }
 
-// Implements diagnose_repair, with validated arguments: lids on all holes of each body. Throws std::bad_alloc, or
-// std::length_error for more boundary vertices than triangles can name.
+// Implements diagnose_repair, with validated arguments: lids on the holes of each body, of at most max_hole_edges
+// edges. Throws std::bad_alloc, or std::length_error for more boundary vertices than triangles can name.
 template <class Draw>
 [[nodiscard]] std::vector<hole_cones> run_module(find_holes_tag, const cpu_backend& backend,
-                                                 std::span<const Draw> draws, const grid& g, bodies each) {
+                                                 std::span<const Draw> draws, const grid& g, bodies each,
+                                                 std::uint64_t max_hole_edges = ~std::uint64_t{0}) {
     solid_options options;
     options.bodies = each;
+    options.max_hole_edges = max_hole_edges;
     solid_counters counts;
     cpu::solid_geometry s = cpu::make_solid_geometry(backend.execution(), draws, g, glm::ivec3(0), options);
     (void)cpu::add_cones(s, options, counts); // more lids than can be drawn may still be measured

@@ -28,6 +28,8 @@ CPP = {
                      ["framebuffer.hpp", "blend.hpp", "core/layout.hpp", "core/value_traits.hpp", "core/half.hpp", "host_target.hpp"]),
     "abuffers": ("A-buffers", "Every fragment of every voxel. In the paper: A-buffer and bucketing.", ["abuffer.hpp"]),
     "solids": ("Solids", "The inside of meshes.", ["solid/solid.hpp", "solid/diagnose_repair.hpp", "solid/core/crossing.hpp"]),
+    "surfaces": ("Surfaces", "Closed manifold meshes of bits, fields and any triangles.",
+                 ["surfaces/surface.hpp", "surfaces/extract.hpp", "surfaces/remesh.hpp"]),
     "distances": ("Distances", "Signed distances from meshes, and the nearest triangle.",
                   ["distance/distance.hpp", "distance/sparse_distance.hpp", "distance/distance_ray.hpp",
                    "distance/core/point_triangle.hpp", "distance/core/row_crossing.hpp"]),
@@ -61,6 +63,7 @@ TASKS = [
     ("The inside of meshes", "samples/guide/solids.cpp", "bodies", "solids"),
     ("A mesh with holes", "samples/guide/solids.cpp", "holes", "solids"),
     ("Distances from a mesh", "samples/17_clearance.cpp", "fields", "distances"),
+    ("A closed mesh of any triangles", "samples/19_remesh.cpp", "remesh", "surfaces"),
     ("Instances", "samples/09_forest.cpp", "instances", "meshes"),
     ("Points", "samples/08_points.cpp", "points", "meshes"),
     ("Tessellation", "samples/05_displaced.cpp", "tessellation", "programs"),
@@ -76,7 +79,7 @@ TASKS = [
 ]
 # Shown nowhere: what the library uses to write NanoVDB files.
 HIDDEN = ["sparse/io/nanovdb_nodes.hpp"]
-PYTHON = ["Grid", "fit", "load_model", "Model", "Material", "Texture", "Part", "voxelize", "solid", "tiles", "distance", "distance_at",
+PYTHON = ["Grid", "fit", "load_model", "Model", "Material", "Texture", "Part", "voxelize", "solid", "tiles", "distance", "distance_at", "remesh", "extract",
           "bake", "sparse", "dense", "VoxelList", "lines", "points", "instances", "Octree", "Hits", "fragments", "Fragments", "save", "formats", "render", "view", "View",
           "DroppedTrianglesWarning", "OpenMeshWarning", "ModelWarning", "WriteError"]
 

@@ -26,6 +26,7 @@ from ._distance import distance, distance_at
 from ._fit import fit
 from ._model import Material, Model, ModelWarning, Part, Texture, load_model
 from ._octree import Hits, Octree
+from ._remesh import extract, remesh
 from ._save import WriteError, formats, render, save
 from ._solid import OpenMeshWarning, solid, tiles
 from ._surface import DroppedTrianglesWarning, Fragments, fragments, voxelize
@@ -56,6 +57,7 @@ __all__ = [
     "dense",
     "distance",
     "distance_at",
+    "extract",
     "fit",
     "formats",
     "fragments",
@@ -63,6 +65,7 @@ __all__ = [
     "lines",
     "load_model",
     "points",
+    "remesh",
     "render",
     "save",
     "solid",

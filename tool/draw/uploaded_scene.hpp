@@ -42,9 +42,10 @@ public:
         : backend_{backend}, request_{request}, wanted_{wanted},
           reference_{reference_point(request.grid)}, tables_{backend, std::vector<color_tables>{make_color_tables()}} {
         upload_pictures(model);
-        // A solid, and the sign of distances, may be decided draw by draw.
-        const bool by_draws =
-            request.solid || (request.distance && request.distance->sign.rule == solid_rule::each_draw);
+        // A solid, and the sign of distances and of a remesh, may be decided draw by draw.
+        const bool by_draws = request.solid ||
+                              (request.distance && request.distance->sign.rule == solid_rule::each_draw) ||
+                              (request.remesh && request.remesh->sign.rule == solid_rule::each_draw);
         const std::uint64_t most_copies = by_draws ? 1 : UINT32_MAX;
         const std::vector<run> triangle_runs = runs_of(model, &primitive::triangles, most_copies);
         const std::vector<run> line_runs =

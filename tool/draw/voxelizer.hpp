@@ -9,6 +9,7 @@
 #include "model/scene.hpp"
 #include "model/targets.hpp"
 #include "model/volume.hpp"
+#include "remesh/remesh_request.hpp"
 #include "solid.hpp"
 
 #include <voxelpipe/core/coverage.hpp>
@@ -49,6 +50,7 @@ struct voxelize_request {
     voxelpipe::coverage coverage = voxelpipe::coverage::conservative;
     std::optional<solid_request> solid;             // instead of the surface, whose coverage is conservative then
     std::optional<distance_request> distance;       // instead of both; the grid is that of the samples then
+    std::optional<remesh_request> remesh;           // instead of all three: no volume is drawn
     std::vector<target> targets{target::occupancy}; // channels of the volume, in this order, none twice
     int depth_axis = 2;                             // 0 x, 1 y, 2 z
     blend_alpha alpha = blend_alpha::weight;

@@ -131,6 +131,7 @@ command_line parse_command_line(int argc, const char* const* argv) {
     understand_batch(options, app.count("--world-size") != 0, app.count("--rank") != 0);
     understand_solid(options, raw);
     understand_distance(options, raw);
+    understand_remesh(options, raw);
     understand_grid(options, raw);
     understand_outputs(options, raw);
     understand_picture(options, raw);

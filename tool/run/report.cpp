@@ -101,7 +101,14 @@ void print_text(std::ostream& stream, const run_report& report) {
     line("fragments") << report.stats.fragments;
     if (report.stats.fragments_discarded != 0) stream << " (" << report.stats.fragments_discarded << " more discarded)";
     stream << '\n';
-    line(report.request.distance ? "samples in band" : "voxels") << report.stats.voxels << '\n';
+    if (!report.request.remesh)
+        line(report.request.distance ? "samples in band" : "voxels") << report.stats.voxels << '\n';
+    if (report.surface) {
+        const voxelpipe::surface_counters& c = report.surface->counts;
+        line("mesh") << c.vertices << " vertices, " << c.faces << " faces, " << c.components
+                     << " components, Euler characteristic " << report.surface->euler << '\n';
+        line("crossings") << c.made_crossings << " made up, " << c.cone_crossings << " on closed holes\n";
+    }
     if (report.request.distance) {
         const distance_request& distance = *report.request.distance;
         line("distance") << (distance.is_whole ? std::string("whole")
@@ -175,8 +182,22 @@ void print_json(std::ostream& stream, const run_report& report) {
                             {"sign", distance.is_signed ? to_string(distance.sign.rule) : "unsigned"}};
         if (report.stats.solid) root["distance"]["open_rows"] = report.stats.solid->open_rows;
     }
+    if (report.surface && report.request.remesh) {
+        const voxelpipe::surface_counters& c = report.surface->counts;
+        root.erase("coverage");
+        root["remesh"] = {{"sign", to_string(report.request.remesh->sign.rule)},
+                          {"level", report.request.remesh->level},
+                          {"vertices", c.vertices},
+                          {"faces", c.faces},
+                          {"components", c.components},
+                          {"euler", report.surface->euler},
+                          {"made_crossings", c.made_crossings},
+                          {"cone_crossings", c.cone_crossings}};
+        if (report.stats.solid) root["remesh"]["open_rows"] = report.stats.solid->open_rows;
+    }
     root["targets"] = json::array();
-    for (const target id : report.request.targets) root["targets"].push_back(info_of(id).name);
+    for (const target id : report.request.targets)
+        if (!report.request.remesh) root["targets"].push_back(info_of(id).name);
     root["backend"] = report.stats.backend;
     if (!report.stats.device.empty()) root["device"] = report.stats.device;
     if (report.stats.devices != 0) root["devices"] = report.stats.devices;

@@ -6,7 +6,9 @@
 #include "draw/voxelizer.hpp"
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -36,6 +38,12 @@ private:
     std::chrono::steady_clock::time_point start_{};
 };
 
+// The mesh of --remesh.
+struct surface_result {
+    voxelpipe::surface_counters counts;
+    std::int64_t euler = 0; // V - E + F
+};
+
 // Everything that --stats prints.
 struct run_report {
     std::filesystem::path input;
@@ -45,8 +53,9 @@ struct run_report {
     std::vector<std::string> materials; // names, by the numbers of --target material
     std::vector<std::filesystem::path> files;
     std::vector<std::string> warnings;
-    std::uint64_t peak_memory = 0; // bytes
-    bool is_sparse = false;        // the voxels were kept in bricks:
+    std::uint64_t peak_memory = 0;         // bytes
+    std::optional<surface_result> surface; // of --remesh
+    bool is_sparse = false;                // the voxels were kept in bricks:
     std::uint64_t bricks = 0, brick_bytes = 0;
 };
 

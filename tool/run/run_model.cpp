@@ -6,6 +6,7 @@
 #include "draw/cuda_device.hpp"
 #include "draw/distance/distance_voxelizer.hpp"
 #include "draw/picture_levels.hpp"
+#include "draw/remesh/remesher.hpp"
 #include "draw/sparse/sparse_voxelizer.hpp"
 #include "draw/sparse/streamed_model.hpp"
 #include "model/memory.hpp"
@@ -15,6 +16,7 @@
 #include "write/formats/blocks.hpp"
 #include "write/level_set.hpp"
 #include "write/sparse_formats.hpp"
+#include "write/surface_files.hpp"
 #include "write_bytes.hpp"
 
 #include <algorithm>
@@ -40,7 +42,8 @@ double milliseconds_since(clock::time_point start) {
 
 // CUDA, starting already where it will be used or may be.
 std::shared_ptr<cuda_start> start_cuda(const command_line& options) {
-    if (!built_with_cuda() || options.voxelize.backend == backend_choice::cpu || options.voxelize.distance)
+    if (!built_with_cuda() || options.voxelize.backend == backend_choice::cpu || options.voxelize.distance ||
+        options.voxelize.remesh)
         return nullptr;
     std::error_code error;
     const std::uintmax_t bytes = std::filesystem::file_size(options.input, error);
@@ -132,6 +135,7 @@ void warn_of_part(const bounding_box& bounds, run_report& report) {
     const voxelize_request& request = report.request;
     const bool is_flooded = request.solid      ? request.solid->rule == solid_rule::exterior
                             : request.distance ? request.distance->sign.rule == solid_rule::exterior
+                            : request.remesh   ? request.remesh->sign.rule == solid_rule::exterior
                                                : false;
     if (!is_flooded || (report.stats.solid && report.stats.solid->is_examined)) return;
     const glm::dvec3 first = request.grid.part_origin(),
@@ -163,6 +167,27 @@ void run_slabs(const command_line& options, slab_source&& source, const bounding
         std::cerr << " as process " << options.batch.rank << " of " << options.batch.world_size;
     if (outcome.left != 0) std::cerr << "; " << outcome.left << " are not there yet";
     std::cerr << '\n';
+}
+
+// Makes the mesh of --remesh, and writes it.
+void run_remesh(const command_line& options, scene&& model, const bounding_box& bounds, progress_bar& bar,
+                run_report& report) {
+    bar.start("remeshing");
+    const surface_mesh mesh = run_remesher(std::move(model), report.request, report.stats);
+    report.surface = surface_result{mesh.counts, mesh.euler()};
+    report.warnings.insert(report.warnings.end(), report.stats.warnings.begin(), report.stats.warnings.end());
+    warn_of_dropped(report);
+    warn_of_part(bounds, report);
+    const auto start = clock::now();
+    for (const std::filesystem::path& output : options.outputs) {
+        write_options how = options.write;
+        bar.start("writing " + output.filename().string());
+        how.progress = [&bar](double done) { bar.show(done); };
+        how.warn = [&report](const std::string& warning) { report.warnings.push_back(warning); };
+        for (std::filesystem::path& file : write_surface(mesh, output, how)) report.files.push_back(std::move(file));
+    }
+    bar.clear();
+    report.stats.milliseconds.emplace_back("write", milliseconds_since(start));
 }
 
 // True if a model takes an eighth of the run's memory, so that its stream may fit where it does not. Copies are not
@@ -217,8 +242,9 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     const std::uint64_t elements = stream ? stream->num_triangles() : model.triangle_count() + model.line_count();
     const bool may_be_empty = options.voxelize.distance && options.grid.origin; // a grid that needs no model
     if (elements == 0 && !may_be_empty) refuse("there are no triangles, lines or points to voxelize");
-    if (!stream && model.triangle_count() == 0 && options.voxelize.solid)
-        refuse("there are only lines and points, which enclose nothing: --solid needs triangles");
+    if (!stream && model.triangle_count() == 0 && (options.voxelize.solid || options.voxelize.remesh))
+        refuse(std::string("there are only lines and points, which enclose nothing: ") +
+               (options.voxelize.solid ? "--solid" : "--remesh") + " needs triangles");
     if (elements > UINT32_MAX)
         refuse("there are " + std::to_string(elements) + " triangles, lines and points, more than the " +
                std::to_string(UINT32_MAX) + " that can be numbered");
@@ -263,7 +289,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
                                                    options.write));
         return bytes;
     };
-    if (report.request.distance) {
+    if (report.request.distance || report.request.remesh) {
         storage = {false, false, ""};
     } else if (!stream) {
         storage.sparse = false;
@@ -278,6 +304,13 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     if (!options.quiet && !storage.reason.empty())
         std::cerr << "voxelize: a sparse grid of " << extent.x << " x " << extent.y << " x " << extent.z
                   << " voxels: " << storage.reason << '\n';
+    if (report.request.remesh) {
+        run_remesh(options, std::move(model), bounds, bar, report);
+        helps_to_stream = false;
+        report.peak_memory = memory::peak();
+        add_rest(report, milliseconds_since(begin));
+        return;
+    }
     bar.start(report.request.distance ? "measuring" : storage.sparse ? "voxelizing into bricks" : "voxelizing");
     report.request.progress = [&bar](double done) { bar.show(done); };
     volume voxels;
@@ -336,9 +369,9 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
 opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder, double loaded_room) {
     const voxelize_request& request = options.voxelize;
     const bool needs_dense = request.solid && request.solid->fill == solid_fill::nearest;
-    const bool is_drawn_here = !request.distance && !needs_dense && request.backend != backend_choice::cuda &&
-                               request.strategy == voxelpipe::strategy::automatic &&
-                               options.storage != storage_choice::dense;
+    const bool is_drawn_here =
+        !request.distance && !request.remesh && !needs_dense && request.backend != backend_choice::cuda &&
+        request.strategy == voxelpipe::strategy::automatic && options.storage != storage_choice::dense;
     if (!is_drawn_here) return {};
     return open_stream(options.input, {memory::room() / 8, loaded_room}, folder, options.load);
 }

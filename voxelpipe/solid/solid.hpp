@@ -132,7 +132,8 @@ template <class Mesh, class VertexShader, class SolidShader, class Payload>
 // Names the calls of this module: a backend implements voxelize_solid as run_module(solid_tag, backend, draws, grid,
 // framebuffer_view or A-buffer, options, number of triangles), which argument-dependent lookup finds by the tag.
 struct solid_tag {};
-// The tag of diagnose_repair, whose arguments are draws, grid and bodies. Gives the lids on all holes of each body.
+// The tag of diagnose_repair and remesh, whose arguments are draws, grid, bodies, and optionally the greatest number of
+// edges of a hole. Gives the lids on the holes of each body.
 struct find_holes_tag {};
 
 // True if a backend's calls take solid_options::slab.

@@ -249,10 +249,27 @@ void describe_distances(CLI::App& app, raw_options& raw) {
                  "Samples at the corners of the voxels, one more along each axis. Default: at their centres")
         ->group("Distances");
     app.add_option("--iso", raw.iso,
-                   "What pictures, meshes and lists of voxels show of distances: those of at most D. Default: 0, the "
-                   "model")
+                   "What pictures, meshes and lists of voxels show of distances: those of at most D; with --remesh the "
+                   "distance at which the mesh lies. Default: 0, the model")
         ->option_text("D")
         ->group("Distances");
+}
+
+void describe_remesh(CLI::App& app, raw_options& raw) {
+    app.add_flag("--remesh", raw.remesh,
+                 "Make a closed manifold mesh around what lies inside, not voxels; the outputs are .glb, .ply, .stl, "
+                 ".obj, .3mf or .npz. See REMESHING")
+        ->group("Remeshing");
+    add_choice(
+        app, "--place", raw.place,
+        {{"corner", voxelpipe::place::corner}, {"mean", voxelpipe::place::mean}, {"sharp", voxelpipe::place::sharp}},
+        "Where its vertices lie: where the model's planes meet (sharp), which keeps creases and corners, at the "
+        "mean of its crossings, or at the corners of voxels. Default: sharp")
+        ->group("Remeshing");
+    app.add_flag("--quads", raw.quads, "Quads, where the format has them: .obj, .ply and .npz")->group("Remeshing");
+    app.add_flag("--report", raw.report,
+                 "Print the mesh's components, its Euler characteristic, and how many crossings were made up")
+        ->group("Remeshing");
 }
 
 void describe_machine(CLI::App& app, command_line& options) {
@@ -427,6 +444,7 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
     describe_values(app, options, raw);
     describe_solids(app, raw);
     describe_distances(app, raw);
+    describe_remesh(app, raw);
     describe_machine(app, options);
     describe_picture(app, options, raw);
     describe_output(app, options);

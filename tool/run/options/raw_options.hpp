@@ -6,6 +6,7 @@
 #include "run/command_line.hpp"
 
 #include <voxelpipe/core/coverage.hpp>
+#include <voxelpipe/surfaces/surface.hpp>
 
 #include <optional>
 #include <string>
@@ -30,6 +31,10 @@ struct raw_options {
     bool is_unsigned = false;
     bool corners = false;
     std::optional<double> iso;
+    bool remesh = false;
+    std::optional<voxelpipe::place> place;
+    bool quads = false;
+    bool report = false;
     std::vector<std::string> targets;
     bool no_edges = false;
     bool no_ground = false;
@@ -46,6 +51,7 @@ void understand_batch(command_line& options, bool has_world, bool has_rank);
 // Fills OPTIONS from RAW, in this order. They throw usage_error.
 void understand_solid(command_line& options, const raw_options& raw);
 void understand_distance(command_line& options, const raw_options& raw);
+void understand_remesh(command_line& options, const raw_options& raw);
 void understand_grid(command_line& options, const raw_options& raw);
 void understand_outputs(command_line& options, const raw_options& raw);
 void understand_picture(command_line& options, const raw_options& raw);

@@ -4,6 +4,7 @@
 #include "raw_options.hpp"
 #include "values.hpp"
 #include "write/formats/blocks.hpp"
+#include "write/surface_files.hpp"
 
 #include <unistd.h>
 
@@ -16,6 +17,7 @@
 #include <initializer_list>
 #include <memory>
 #include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -105,7 +107,7 @@ void understand_fill(command_line& options, const std::string& text) {
 
 void understand_solid(command_line& options, const raw_options& raw) {
     if (raw.coverage) options.voxelize.coverage = *raw.coverage;
-    if (!raw.solid && !raw.distance) {
+    if (!raw.solid && !raw.distance && !raw.remesh) {
         const std::pair<const char*, bool> given[]{{"--solid-extent", raw.extent_of_solid.has_value()},
                                                    {"--close-holes", !raw.close_holes.empty()},
                                                    {"--vote", raw.vote},
@@ -153,8 +155,13 @@ void understand_distance(command_line& options, const raw_options& raw) {
                                                {"--corners", raw.corners},
                                                {"--iso", raw.iso.has_value()}};
     if (!raw.distance) {
-        for (const auto& [name, is_given] : given)
-            if (is_given) throw usage_error(std::string(name) + " goes with --distance");
+        for (const auto& [name, is_given] : given) {
+            const bool has_level = raw.remesh && std::string_view(name) == "--iso";
+            if (is_given && !has_level)
+                throw usage_error(std::string(name) + (std::string_view(name) == "--iso"
+                                                           ? " goes with --distance or --remesh"
+                                                           : " goes with --distance"));
+        }
         return;
     }
     distance_request& distance = options.voxelize.distance.emplace();
@@ -187,6 +194,40 @@ void understand_distance(command_line& options, const raw_options& raw) {
         for (const std::filesystem::path& output : options.outputs)
             if (lower_extension(output) == ".nvdb")
                 throw usage_error("--pieces does not go with --distance and .nvdb: a level set is one grid");
+}
+
+void understand_remesh(command_line& options, const raw_options& raw) {
+    const std::pair<const char*, bool> given[]{
+        {"--place", raw.place.has_value()}, {"--quads", raw.quads}, {"--report", raw.report}};
+    if (!raw.remesh) {
+        for (const auto& [name, is_given] : given)
+            if (is_given) throw usage_error(std::string(name) + " goes with --remesh");
+        return;
+    }
+    const auto refuse = [](const char* what, const char* why) {
+        throw usage_error(std::string(what) + " does not go with --remesh: " + why);
+    };
+    if (raw.distance) refuse("--distance", "one makes a field, the other a mesh");
+    if (raw.coverage) refuse("--coverage", "what lies inside is decided at the voxels' centres");
+    if (raw.extent_of_solid) refuse("--solid-extent", "a sample is inside or not");
+    if (!raw.fill.empty()) refuse("--fill", "the mesh is a surface");
+    if (!raw.targets.empty()) refuse("--target", "there are no voxels that would hold values");
+    if (options.write.merge_faces) refuse("--merge", "it joins sides of voxels");
+    if (options.write.points) refuse("--points", "they are centres of voxels");
+    if (options.storage != storage_choice::automatic)
+        refuse(options.storage == storage_choice::sparse ? "--sparse" : "--dense", "no voxels are kept");
+    if (options.by_slabs) refuse("--resume", "it is one piece of work, also for several processes");
+    for (const std::filesystem::path& output : options.outputs)
+        if (!writes_surface(output))
+            throw usage_error("--remesh makes a mesh: \"" + output.string() +
+                              "\" is none; there are .glb, .ply, .stl, .obj, .3mf and .npz");
+    if (raw.iso && !std::isfinite(*raw.iso)) throw usage_error("--iso takes a finite distance");
+    remesh_request& remesh = options.voxelize.remesh.emplace();
+    remesh.sign = *std::exchange(options.voxelize.solid, std::nullopt);
+    remesh.place = raw.place.value_or(voxelpipe::place::sharp);
+    remesh.level = raw.iso.value_or(0);
+    remesh.quads = raw.quads;
+    remesh.reports = raw.report;
 }
 
 void understand_grid(command_line& options, const raw_options& raw) {
@@ -300,9 +341,10 @@ void understand_outputs(command_line& options, const raw_options& raw) {
         targets.insert(targets.begin(), target::distance);
         needs_occupancy = false; // the level stands for it
     }
+    if (options.voxelize.remesh) needs_occupancy = false;
     if (targets.empty()) {
         targets.push_back(target::occupancy);
-        if (shows_colors && !raw.no_color) options.implied.push_back(target::color);
+        if (shows_colors && !raw.no_color && !options.voxelize.remesh) options.implied.push_back(target::color);
     }
     if (options.blocks && !options.blocks->materials.empty() &&
         std::find(targets.begin(), targets.end(), target::material) == targets.end())

@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
+#include "mesh_3mf.hpp"
+
 #include "deflate.hpp"
 #include "mesh_parts.hpp"
 #include "model/parallel.hpp"
@@ -178,6 +180,25 @@ void write_package(output_file& out, const model_text& model, const write_option
 }
 
 } // namespace
+
+void write_3mf_package(output_file& out, int compression, bool is_large, bool is_empty,
+                       const std::function<void(const entry_sink&)>& objects) {
+    zip_archive archive(out, compression);
+    add_small(archive, "[Content_Types].xml", content_types);
+    add_small(archive, "_rels/.rels", relationships);
+    archive.add(
+        "3D/3dmodel.model",
+        [&](const entry_sink& add) {
+            add(std::as_bytes(std::span{model_head}));
+            if (!is_empty) objects(add);
+            const std::string_view end = is_empty
+                                             ? "</resources>\n<build/>\n</model>\n"
+                                             : "</resources>\n<build>\n<item objectid=\"1\"/>\n</build>\n</model>\n";
+            add(std::as_bytes(std::span{end}));
+        },
+        is_large);
+    archive.finish();
+}
 
 std::vector<std::filesystem::path> write_3mf(const voxel_shape& v, const std::filesystem::path& path,
                                              const write_options& options) {

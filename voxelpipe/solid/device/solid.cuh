@@ -110,14 +110,15 @@ status run_module(solid_tag, cuda_backend& backend, std::span<const draw<Mesh, V
     return s;
 }
 
-// Implements diagnose_repair: lids on all holes of each body. Waits. Throws std::bad_alloc, std::length_error, or
-// std::runtime_error with CUDA's text.
+// Implements diagnose_repair: lids on the holes of each body, of at most max_hole_edges edges. Waits. Throws
+// std::bad_alloc, std::length_error, or std::runtime_error with CUDA's text.
 template <class Mesh, class VertexShader, class SolidShader>
-[[nodiscard]] std::vector<hole_cones> run_module(find_holes_tag, cuda_backend& backend,
-                                                 std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
-                                                 const grid& g, bodies each) {
+[[nodiscard]] std::vector<hole_cones>
+run_module(find_holes_tag, cuda_backend& backend, std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
+           const grid& g, bodies each, std::uint64_t max_hole_edges = ~std::uint64_t{0}) {
     solid_options options;
     options.bodies = each;
+    options.max_hole_edges = max_hole_edges;
     try {
         return device::find_cones(backend, draws, g, options);
     } catch (const device::cuda_failure& e) {

@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from ._core import Grid
+from ._distance import _host_mesh, _warn_of_holes
+from ._surface import take_counts
+from ._types import Bodies, Border, Fill, MeshLike, Place, Repair, check_call, check_choice
+
+
+def _check_numbers(level: float, min_component: int) -> None:
+    if not math.isfinite(level):
+        raise ValueError(f"level is a finite number, not {level!r}")
+    if min_component < 0:
+        raise ValueError(f"min_component is a number of vertices, 0 or more, not {min_component!r}")
+
+
+def _faces_for(to_caller: Any, faces: np.ndarray) -> Any:
+    made = to_caller(faces)
+    return made if isinstance(made, np.ndarray) else to_caller(faces.astype(np.int64))
+
+
+def remesh(
+    mesh: MeshLike,
+    grid: Grid,
+    sign: Fill = "nonzero",
+    *,
+    repair: Repair = "none",
+    closing: int = 0,
+    bodies: Bodies = "all",
+    max_hole_edges: int | None = None,
+    place: Place = "sharp",
+    level: float = 0.0,
+    quads: bool = False,
+    min_component: int = 0,
+    threads: int = 0,
+    status: dict[str, int] | None = None,
+) -> Any:
+    """A closed manifold mesh around what lies inside of any triangles: every edge has two faces, every vertex one fan.
+
+    Args:
+        mesh, grid: as in voxelize(). Samples are the centres of voxels.
+        sign: what is inside, as `fill` of solid(): "nonzero", "even_odd" or "positive".
+        repair, closing, bodies, max_hole_edges: as in solid(), for meshes that are not closed.
+        place: where vertices lie: "sharp" where the mesh's planes meet, which keeps creases and corners; "mean" at the mean
+            of a cell's crossings; "corner" at the corners of voxels.
+        level: the signed distance at which the surface lies, in the mesh's units. Above 0 bodies grow, and a sheet becomes
+            a closed plate of twice the level.
+        quads: (m, 4) in place of (m, 3).
+        min_component: components of fewer vertices are left out.
+        threads: 0 takes all cores. The result is the same for any number.
+        status: a dict that is filled with the call's counters: those of solid(), components, made_crossings (edges that the
+            mesh does not cross, crossed in their middle: 0 for a closed mesh) and cone_crossings among them.
+
+    Returns vertices, float64 (n, 3), in world units; faces, uint32 (m, 3), int64 for torch, counter-clockwise seen from
+    outside; and a dict with `cell` (n, 3), the index (x, y, z) of the lowest sample of each vertex's cell, `sheet` (n), and
+    `source` (n), a triangle that it comes from, -1 for none. Warns with OpenMeshWarning where rows of samples prove that
+    the mesh is not closed. Raises ValueError for a level that is not finite, IndexError for a triangle that names a vertex
+    that does not exist, TypeError for a mesh in a GPU's memory.
+
+    Example:
+        >>> vertices, faces, more = vp.remesh(mesh, grid, repair="close_holes")
+    """
+    check_call("remesh", grid, "conservative", threads, status)
+    for what, value, choices in (
+        ("sign", sign, Fill),
+        ("repair", repair, Repair),
+        ("bodies", bodies, Bodies),
+        ("place", place, Place),
+    ):
+        check_choice(what, value, choices)
+    _check_numbers(level, min_component)
+    m = _host_mesh(mesh)
+    positions, where = m.positions(grid)
+    vertices, faces, cell, sheet, source, counts = _core.remesh(
+        positions,
+        m.triangles,
+        list(m.first_triangles),
+        where,
+        grid,
+        sign,
+        repair,
+        bodies,
+        max_hole_edges,
+        closing,
+        place,
+        float(level),
+        quads,
+        min_component,
+        threads,
+    )
+    take_counts(counts, status)
+    _warn_of_holes(counts, f" of {grid.shape[0] * grid.shape[1]} rows of samples", repair)
+    if len(source) != len(vertices):
+        source = np.full(len(vertices), -1, np.int64)
+    more = {"cell": cell, "sheet": sheet, "source": source}
+    return m.to_caller(vertices), _faces_for(m.to_caller, faces), {k: m.to_caller(v) for k, v in more.items()}
+
+
+def extract(
+    values: Any,
+    grid: Grid,
+    *,
+    place: Place = "mean",
+    level: float = 0.0,
+    border: Border = "closed",
+    quads: bool = False,
+    min_component: int = 0,
+    threads: int = 0,
+    status: dict[str, int] | None = None,
+) -> Any:
+    """A closed manifold mesh of voxels, or of a field at a level.
+
+    Args:
+        values: bool (nz, ny, nx): the voxels that are inside. Or floats, such as those of distance(): what is below
+            `level` is inside; NaN is outside.
+        grid: the grid of the values; a value lies at the centre of its voxel.
+        place: where vertices lie in their cells: "mean" at the mean of the cell's crossings, "corner" at the corners of
+            voxels. "sharp" has no planes here, and is "mean".
+        level: of floats.
+        border: "closed": what lies beyond the grid is outside; "open": faces that reach there are left out.
+        quads, min_component, threads, status: as in remesh().
+
+    Returns vertices, faces and a dict as remesh() does, with a `source` of -1. Raises ValueError for values of another
+    shape than the grid, TypeError for values that are neither bool nor floats.
+
+    Example:
+        >>> vertices, faces, more = vp.extract(vp.solid(mesh, grid), grid, place="corner")
+    """
+    check_call("extract", grid, "conservative", threads, status)
+    check_choice("place", place, Place)
+    check_choice("border", border, Border)
+    _check_numbers(level, min_component)
+    array = np.asarray(values)
+    if array.dtype == np.bool_:
+        if level != 0:
+            raise ValueError("bool values have no level")
+        made = _core.extract_bits(
+            np.ascontiguousarray(array).view(np.uint8), grid, place, border == "open", quads, min_component, threads
+        )
+    elif np.issubdtype(array.dtype, np.floating):
+        field = np.ascontiguousarray(array, np.float32)
+        made = _core.extract_field(field, grid, place, float(level), border == "open", quads, min_component, threads)
+    else:
+        raise TypeError(f"values are bool, which voxels are inside, or floats, not {array.dtype}")
+    vertices, faces, cell, sheet, _, counts = made
+    take_counts(counts, status)
+    return vertices, faces, {"cell": cell, "sheet": sheet, "source": np.full(len(vertices), -1, np.int64)}

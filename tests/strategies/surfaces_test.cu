@@ -1,0 +1,82 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Surfaces on the device: the bytes and counters of cpu_backend.
+
+#include "../surfaces/surface_support.hpp"
+
+#include <cpu_ref/backend.hpp>
+#include <voxelpipe/surfaces/device/surfaces.cuh>
+#include <voxelpipe/voxelpipe.hpp>
+
+#include <gtest/gtest.h>
+
+using namespace surface_tests;
+
+namespace {
+
+vp::grid grid_around_models(const glm::ivec3& extent) {
+    return vp::fit(vp::bounding_box{glm::dvec3(0.0), glm::dvec3(1.0)}, extent);
+}
+void expect_same(const host_mesh& m, const vp::grid& g, const vp::remesh_options& o) {
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    const host_surface a = remesh(gpu, m, g, o), b = remesh(cpu, m, g, o);
+    EXPECT_TRUE(a.status.ok()) << a.status.message();
+    EXPECT_TRUE(a.has_same_arrays(b)) << a.vertices.size() << " and " << b.vertices.size() << " vertices";
+    EXPECT_TRUE(a.is_closed_manifold());
+    EXPECT_EQ(a.status.counts, b.status.counts);
+    EXPECT_EQ(a.status.solid, b.status.solid);
+}
+
+} // namespace
+
+TEST(DeviceSurfaces, OfBitsHaveTheBytesOfTheCpu) {
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    std::mt19937 random(1);
+    for (int k = 0; k < 12; ++k) {
+        const bit_volume v = random_volume(random, glm::ivec3(3 + 9 * (k % 5), 4 + k, 7), 0.3 + 0.04 * k);
+        for (const vp::extract_options& o :
+             {vp::extract_options{}, vp::extract_options{.place = vp::place::corner, .quads = true},
+              vp::extract_options{.border = vp::border::open, .min_component = 12}}) {
+            const host_surface a = extract_bits(gpu, v, o), b = extract_bits(cpu, v, o);
+            EXPECT_TRUE(a.status.ok());
+            EXPECT_TRUE(a.has_same_arrays(b)) << k;
+        }
+    }
+}
+
+TEST(DeviceSurfaces, OfFieldsHaveTheBytesOfTheCpu) {
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    std::mt19937 random(2);
+    const vp::grid g = grid_of(glm::ivec3(37, 9, 8));
+    std::vector<float> values(37 * 9 * 8);
+    for (float& f : values) f = static_cast<float>(random() % 2001) / 1000.0f - 1.0f;
+    values[77] = std::nanf("");
+    values[200] = -INFINITY;
+    for (const double level : {0.0, 0.3}) {
+        const host_surface a = extract_field(gpu, values, g, {.level = level}),
+                           b = extract_field(cpu, values, g, {.level = level});
+        EXPECT_TRUE(a.status.ok());
+        EXPECT_TRUE(a.has_same_arrays(b));
+        EXPECT_EQ(a.status.surface.nan_samples, 1u);
+    }
+}
+
+TEST(DeviceSurfaces, OfBadModelsHaveTheBytesOfTheCpu) {
+    for (std::uint32_t seed = 0; seed < 4; ++seed) {
+        const host_mesh m = bad_model(seed);
+        const vp::grid g = grid_around_models(glm::ivec3(18, 21, 19));
+        expect_same(m, g, {});
+        expect_same(m, g, {.place = vp::place::mean, .rule = vp::fill_rule::even_odd, .quads = true});
+        expect_same(m, g, {.repair = vp::repair::close_holes});
+        if (seed < 2) {
+            expect_same(m, g, {.repair = vp::repair::exterior, .min_component = 9});
+            expect_same(m, g, {.place = vp::place::corner, .repair = vp::repair::vote});
+            expect_same(m, g, {.sample = vp::sample::corner, .bodies = vp::bodies::draw});
+            expect_same(m, g, {.level = 0.05});
+        }
+    }
+}

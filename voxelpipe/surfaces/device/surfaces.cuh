@@ -1,0 +1,11 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// extract and remesh on a GPU: their passes are those of every backend (surfaces/passes), for which cuda_backend has
+// loops, CUB's sums and sorts. What they call besides is included here: solids for the sign, distances for a level.
+
+#include <voxelpipe/distance/device/distance.cuh>
+#include <voxelpipe/solid/device/solid.cuh>
+#include <voxelpipe/surfaces/extract.hpp>
+#include <voxelpipe/surfaces/remesh.hpp>

@@ -1,0 +1,158 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// From the bits of samples to a surface: cells, flips, vertices, quads, components, triangles. The same passes on every
+// backend.
+
+#include <voxelpipe/surfaces/passes/parts.hpp>
+#include <voxelpipe/surfaces/passes/vertices.hpp>
+#include <voxelpipe/voxelize.hpp>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe::core {
+
+// The cells that a surface passes, with their sheets and crossed edges numbered.
+template <class Backend>
+class surface_cells {
+    template <class T>
+    using buffer = typename Backend::template buffer<T>;
+
+public:
+    // The samples are those of a grid of this extent; their memory outlives the object. Waits.
+    surface_cells(Backend& backend, const std::uint32_t* samples, const glm::ivec3& extent)
+        : backend_(backend), grid_{{samples, extent.x, extent.y, extent.z}},
+          table_(backend, array_view<const cell_sheets>(host_table())),
+          first_of_word_(backend, grid_.rows() * static_cast<std::uint64_t>(grid_.row_words())), keys_(backend, 0),
+          states_(backend, 0), first_vertices_(backend, 0), first_edges_(backend, 0) {
+        const std::uint64_t rows = grid_.rows();
+        buffer<std::uint64_t> first_of_row(backend, rows + 1);
+        {
+            buffer<std::uint32_t> counts(backend, rows + 1);
+            backend.for_each(rows + 1, passes::count_active_cells{grid_, counts.data()});
+            count_ = backend.sum(counts, first_of_row);
+        }
+        if (count_ > most) { // a cell has a vertex at least
+            num_vertices_ = count_;
+            return;
+        }
+        keys_ = buffer<std::uint64_t>(backend, count_);
+        states_ = buffer<std::uint16_t>(backend, count_);
+        backend.for_each(rows, passes::list_active_cells{grid_, first_of_row.data(), first_of_word_.data(),
+                                                         keys_.data(), states_.data()});
+        buffer<std::uint32_t> sheets(backend, count_ + 1), edges(backend, count_ + 1);
+        first_vertices_ = buffer<std::uint64_t>(backend, count_ + 1);
+        first_edges_ = buffer<std::uint64_t>(backend, count_ + 1);
+        backend.for_each(count_ + 1, passes::flip_cells{grid_.samples, table_.data(), keys_.data(), count_,
+                                                        states_.data(), sheets.data(), edges.data()});
+        num_vertices_ = backend.sum(sheets, first_vertices_);
+        num_edges_ = backend.sum(edges, first_edges_);
+    }
+
+    [[nodiscard]] bool are_too_many() const { return num_vertices_ > most; }
+    [[nodiscard]] std::uint64_t count() const { return count_; }
+    [[nodiscard]] std::uint64_t num_vertices() const { return num_vertices_; }
+    [[nodiscard]] std::uint64_t num_edges() const { return num_edges_; } // crossed ones, which are the quads
+    // Refers to the object.
+    [[nodiscard]] passes::cell_list list() const {
+        return {grid_,          table_.data(),          first_of_word_.data(), keys_.data(),
+                states_.data(), first_vertices_.data(), first_edges_.data()};
+    }
+
+private:
+    static constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
+    static const std::array<cell_sheets, 512>& host_table() {
+        static const std::array<cell_sheets, 512> table = make_cell_table();
+        return table;
+    }
+
+    Backend& backend_;
+    passes::cell_grid grid_;
+    buffer<cell_sheets> table_;
+    buffer<std::uint32_t> first_of_word_;
+    buffer<std::uint64_t> keys_;
+    buffer<std::uint16_t> states_;
+    buffer<std::uint64_t> first_vertices_, first_edges_;
+    std::uint64_t count_ = 0, num_vertices_ = 0, num_edges_ = 0;
+};
+
+// Leaves out what the options ask for, and counts components.
+template <class Backend>
+void choose_parts(Backend& backend, const extract_options& options, surface<Backend>& out, surface_counters& counts) {
+    using words = typename Backend::template buffer<std::uint32_t>;
+    using numbers = typename Backend::template buffer<std::uint64_t>;
+    const std::uint64_t vertices = out.vertices.size(), quads = out.quads.size();
+    words parents(backend, vertices), kept(backend, vertices + 1), kept_quads(backend, quads + 1);
+    numbers sizes(backend, vertices), found(backend, static_cast<std::size_t>(passes::part_count::count));
+    const passes::vertex_sets sets{parents.data()};
+    backend.for_each(vertices, passes::start_vertices{parents.data(), kept.data()});
+    backend.for_each(vertices, passes::clear_counts{sizes.data()});
+    backend.for_each(found.size(), passes::clear_counts{found.data()});
+    backend.for_each(quads, passes::join_quads{out.quads.data(), out.vertices.data(), out.samples.extent,
+                                               options.border == border::open, sets, kept.data(), kept_quads.data()});
+    backend.for_each(vertices, passes::count_members{sets, kept.data(), sizes.data()});
+    const std::uint64_t least = options.min_component;
+    backend.for_each(vertices, passes::choose_components{sets, sizes.data(), least, found.data()});
+    const std::vector<std::uint64_t> host = found.to_host(backend);
+    counts.components_left_out = host[static_cast<std::size_t>(passes::part_count::left_out)];
+    counts.components = host[static_cast<std::size_t>(passes::part_count::found)] - counts.components_left_out;
+    if (options.border == border::closed && counts.components_left_out == 0) return;
+
+    numbers places(backend, vertices + 1), quad_places(backend, quads + 1);
+    backend.for_each(vertices + 1, passes::drop_vertices{sets, sizes.data(), least, vertices, kept.data()});
+    backend.for_each(quads + 1, passes::drop_quads{out.quads.data(), kept.data(), quads, kept_quads.data()});
+    const std::uint64_t vertices_left = backend.sum(kept, places), quads_left = backend.sum(kept_quads, quad_places);
+    typename Backend::template buffer<surface_vertex> moved(backend, vertices_left);
+    typename Backend::template buffer<glm::uvec4> moved_quads(backend, quads_left);
+    const bool has_sources = out.sources.size() != 0;
+    words sources(backend, has_sources ? vertices_left : 0);
+    backend.for_each(vertices,
+                     passes::move_vertices{kept.data(), places.data(), out.vertices.data(),
+                                           has_sources ? out.sources.data() : nullptr, moved.data(), sources.data()});
+    backend.for_each(quads, passes::move_quads{kept_quads.data(), quad_places.data(), places.data(), out.quads.data(),
+                                               moved_quads.data()});
+    out.vertices = std::move(moved);
+    out.quads = std::move(moved_quads);
+    out.sources = std::move(sources);
+}
+
+// The surface of cells whose crossings are known; null: all in the middle of their edges.
+template <class Backend>
+[[nodiscard]] status finish_surface(Backend& backend, const surface_cells<Backend>& cells, const grid& samples,
+                                    const edge_crossing* crossings, bool has_sources, const extract_options& options,
+                                    surface<Backend>& out, status result) {
+    surface<Backend> made(backend);
+    made.samples = samples;
+    made.vertices = typename Backend::template buffer<surface_vertex>(backend, cells.num_vertices());
+    made.quads = typename Backend::template buffer<glm::uvec4>(backend, cells.num_edges());
+    if (has_sources) made.sources = typename Backend::template buffer<std::uint32_t>(backend, cells.num_vertices());
+    backend.for_each(cells.count(), passes::place_vertices{cells.list(), options.place, crossings, made.vertices.data(),
+                                                           has_sources ? made.sources.data() : nullptr});
+    backend.for_each(cells.count(), passes::list_quads{cells.list(), made.quads.data()});
+    choose_parts(backend, options, made, result.surface);
+    result.surface.vertices = made.vertices.size();
+    result.surface.faces = made.quads.size();
+    if (!options.quads) {
+        result.surface.faces = 2 * made.quads.size();
+        made.triangles = typename Backend::template buffer<glm::uvec3>(backend, result.surface.faces);
+        backend.for_each(made.quads.size(), passes::cut_quads{made.vertices.data(), made.quads.data(),
+                                                              options.place == place::sharp, made.triangles.data()});
+        made.quads = typename Backend::template buffer<glm::uvec4>(backend, 0);
+    }
+    out = std::move(made);
+    return result;
+}
+
+[[nodiscard]] inline status too_many_vertices(std::uint64_t number) {
+    status s = failure(status_code::too_many_vertices, stage::coarse_raster);
+    s.surface.vertices = number;
+    return s;
+}
+
+} // namespace voxelpipe::core

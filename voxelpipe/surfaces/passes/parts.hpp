@@ -1,0 +1,164 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Components of a surface, and leaving parts of it out: functors for a backend's for_each.
+
+#include <voxelpipe/core/shared_counter.hpp>
+#include <voxelpipe/surfaces/surface.hpp>
+
+#include <glm/vec4.hpp>
+
+#include <atomic>
+#include <cstdint>
+
+namespace voxelpipe::core::passes {
+
+// parent[i] from `from` to `to`, if it is still that. Returns what it was.
+VOXELPIPE_HD inline std::uint32_t exchange_parent(std::uint32_t& parent, std::uint32_t from, std::uint32_t to) {
+#if defined(__CUDA_ARCH__)
+    return atomicCAS(&parent, from, to);
+#else
+    std::atomic_ref(parent).compare_exchange_strong(from, to, std::memory_order_relaxed);
+    return from;
+#endif
+}
+
+// Union-find: the root of a set is its lowest number, whatever order threads join in.
+struct vertex_sets {
+    std::uint32_t* parents;
+
+    [[nodiscard]] VOXELPIPE_HD std::uint32_t root(std::uint32_t v) const {
+        for (;;) {
+            const std::uint32_t up = load_shared(parents[v]);
+            if (up == v) return v;
+            const std::uint32_t next = load_shared(parents[up]);
+            if (next != up) exchange_parent(parents[v], up, next); // halves the path
+            v = next;
+        }
+    }
+    VOXELPIPE_HD void join(std::uint32_t a, std::uint32_t b) const {
+        for (;;) {
+            a = root(a);
+            b = root(b);
+            if (a == b) return;
+            const std::uint32_t high = a > b ? a : b, low = a > b ? b : a;
+            if (exchange_parent(parents[high], high, low) == high) return;
+        }
+    }
+};
+
+// Each vertex by itself, and marked as left out.
+struct start_vertices {
+    std::uint32_t *parents, *kept;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        parents[i] = static_cast<std::uint32_t>(i);
+        kept[i] = 0;
+    }
+};
+
+// Joins and marks the vertices of quad i, unless it reaches beyond the grid and the border is open. All threads write
+// the same value to a mark.
+struct join_quads {
+    const glm::uvec4* quads;
+    const surface_vertex* vertices;
+    glm::ivec3 extent;
+    bool open;
+    vertex_sets sets;
+    std::uint32_t* kept;
+    std::uint32_t* kept_quads;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const glm::uvec4 q = quads[i];
+        const bool keep = !open || (is_within(q.x) && is_within(q.y) && is_within(q.z) && is_within(q.w));
+        kept_quads[i] = keep ? 1 : 0;
+        if (!keep) return;
+        for (const std::uint32_t v : {q.x, q.y, q.z, q.w}) store_shared(kept[v], 1, true);
+        sets.join(q.x, q.y);
+        sets.join(q.y, q.z);
+        sets.join(q.z, q.w);
+    }
+    [[nodiscard]] VOXELPIPE_HD bool is_within(std::uint32_t v) const {
+        const glm::ivec3 c = vertices[v].cell;
+        return c.x >= 0 && c.y >= 0 && c.z >= 0 && c.x < extent.x - 1 && c.y < extent.y - 1 && c.z < extent.z - 1;
+    }
+};
+
+// Sizes of components, at their roots.
+struct count_members {
+    vertex_sets sets;
+    const std::uint32_t* kept;
+    std::uint64_t* sizes;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (kept[i] != 0) add_shared(sizes[sets.root(static_cast<std::uint32_t>(i))], 1);
+    }
+};
+
+// How many components there are, and how many are kept.
+enum class part_count : int { found, left_out, count };
+
+struct choose_components {
+    vertex_sets sets;
+    const std::uint64_t* sizes;
+    std::uint64_t least;
+    std::uint64_t* counts; // by part_count
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (sizes[i] == 0) return;
+        add_shared(counts[static_cast<int>(part_count::found)], 1);
+        if (sizes[i] < least) add_shared(counts[static_cast<int>(part_count::left_out)], 1);
+    }
+};
+
+// Leaves out the vertices of small components. kept[count] becomes 0, for a sum.
+struct drop_vertices {
+    vertex_sets sets;
+    const std::uint64_t* sizes;
+    std::uint64_t least, count;
+    std::uint32_t* kept;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (i == count || sizes[sets.root(static_cast<std::uint32_t>(i))] < least) kept[i] = 0;
+    }
+};
+struct drop_quads {
+    const glm::uvec4* quads;
+    const std::uint32_t* kept_vertices;
+    std::uint64_t count;
+    std::uint32_t* kept;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (i == count || kept_vertices[quads[i].x] == 0) kept[i] = 0;
+    }
+};
+
+// What is kept moves together.
+struct move_vertices {
+    const std::uint32_t* kept;
+    const std::uint64_t* places;
+    const surface_vertex* from;
+    const std::uint32_t* from_sources; // or null
+    surface_vertex* to;
+    std::uint32_t* to_sources;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (kept[i] == 0) return;
+        to[places[i]] = from[i];
+        if (from_sources != nullptr) to_sources[places[i]] = from_sources[i];
+    }
+};
+struct move_quads {
+    const std::uint32_t* kept;
+    const std::uint64_t *places, *vertex_places;
+    const glm::uvec4* from;
+    glm::uvec4* to;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (kept[i] == 0) return;
+        const glm::uvec4 q = from[i];
+        to[places[i]] = glm::uvec4(vertex_places[q.x], vertex_places[q.y], vertex_places[q.z], vertex_places[q.w]);
+    }
+};
+
+// Zeros.
+struct clear_counts {
+    std::uint64_t* counts;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const { counts[i] = 0; }
+};
+
+} // namespace voxelpipe::core::passes

@@ -1,0 +1,226 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// remesh: any triangles -> what is inside of them -> a closed manifold mesh around it, whose vertices lie where the
+// triangles are (docs/design.md, "Surfaces"). On any backend, with the same bytes.
+
+#include <voxelpipe/distance/distance.hpp>
+#include <voxelpipe/solid/core/holes.hpp>
+#include <voxelpipe/solid/solid.hpp>
+#include <voxelpipe/surfaces/extract.hpp>
+#include <voxelpipe/surfaces/passes/gather_mesh.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace voxelpipe {
+
+// Written {.repair = repair::close_holes, .place = place::mean}.
+struct remesh_options {
+    voxelpipe::place place = voxelpipe::place::sharp;     // where vertices lie
+    voxelpipe::sample sample = voxelpipe::sample::centre; // where samples lie
+    // What is inside, as in solid_options.
+    fill_rule rule = fill_rule::nonzero;
+    voxelpipe::bodies bodies = voxelpipe::bodies::call;
+    voxelpipe::repair repair = voxelpipe::repair::none;
+    int closing = 0;
+    std::uint64_t max_hole_edges = std::numeric_limits<std::uint64_t>::max();
+    // World units. Not 0: the surface lies where the signed distance is `level`; above 0 bodies grow by it, and a sheet
+    // becomes a closed plate twice as thick. Vertices with place::sharp then lie as with place::mean.
+    double level = 0.0;
+    voxelpipe::border border = voxelpipe::border::closed; // at the faces of the grid
+    bool quads = false;                                   // quads in place of triangles
+    std::uint32_t min_component = 0;                      // components of fewer vertices are left out
+};
+
+namespace core {
+
+[[nodiscard]] inline extract_options extract_options_of(const remesh_options& o) {
+    return {o.place, o.level, o.border, o.quads, o.min_component};
+}
+[[nodiscard]] inline solid_options sign_options(const remesh_options& o) {
+    solid_options s;
+    s.rule = o.rule;
+    s.bodies = o.bodies;
+    s.repair = o.repair;
+    s.closing = o.closing;
+    s.max_hole_edges = o.max_hole_edges;
+    s.count_voxels = false;
+    return s;
+}
+// The fields that reach the level's cells.
+[[nodiscard]] inline distance_options level_options(const remesh_options& o, const grid& g) {
+    distance_options d;
+    const double largest = std::max({g.voxel_size.x, g.voxel_size.y, g.voxel_size.z});
+    d.band = band(std::abs(o.level) / largest + 2.0);
+    d.sample = o.sample;
+    d.rule = o.rule;
+    d.bodies = o.bodies;
+    d.repair = o.repair;
+    d.closing = o.closing;
+    d.max_hole_edges = o.max_hole_edges;
+    d.count_voxels = false;
+    return d;
+}
+
+[[nodiscard]] inline status validate(const remesh_options& o, const grid& g) {
+    if (const status s = validate(extract_options_of(o)); !s.ok()) return s;
+    if (o.sample > sample::corner) return failure(status_code::bad_surface_options);
+    if (o.level != 0.0) return validate(level_options(o, g), g);
+    return validate(sign_options(o), sample_grid(g, o.sample));
+}
+
+// The rule by which crossings of a row change the verdict.
+[[nodiscard]] inline fill_rule crossing_rule(const remesh_options& o) {
+    return o.repair == repair::vote ? fill_rule::even_odd : o.rule;
+}
+
+// The crossings of the mesh with the edges that its surface crosses.
+template <int Axis, class Backend>
+void find_mesh_crossings(Backend& backend, const surface_cells<Backend>& cells, const gathered_mesh<Backend>& mesh,
+                         const grid& samples, const remesh_options& options, edge_crossing* crossings,
+                         std::uint64_t* counts) {
+    using numbers = typename Backend::template buffer<std::uint64_t>;
+    using words = typename Backend::template buffer<std::uint32_t>;
+    const passes::row_keys<Axis> rows(samples.extent);
+    const passes::mesh_triangles triangles = mesh.view();
+    voxel_box whole{};
+    for (int a = 0; a < 3; ++a) whole.hi[a] = samples.extent[a] - 1;
+    passes::list_mesh_crossings<Axis> list{triangles, rows,    whole,   samples.fraction(),
+                                           nullptr,   nullptr, nullptr, nullptr};
+    numbers places(backend, triangles.count + 1);
+    std::uint64_t total = 0;
+    {
+        words of_triangles(backend, triangles.count + 1);
+        list.counts = of_triangles.data();
+        backend.for_each(triangles.count + 1, list);
+        total = backend.sum(of_triangles, places);
+    }
+    numbers keys(backend, total);
+    words found(backend, total);
+    list.counts = nullptr;
+    list.places = places.data();
+    list.keys = keys.data();
+    list.triangles = found.data();
+    backend.for_each(triangles.count, list);
+    backend.sort_by_key(keys, found, rows.key_bits());
+    numbers first_of_row(backend, rows.rows() + 1);
+    backend.for_each(rows.rows() + 1, passes::find_rows{keys.data(), total, rows.bits, first_of_row.data()});
+    backend.for_each(cells.count(),
+                     passes::cross_mesh<Axis>{cells.list(), triangles, rows, first_of_row.data(), keys.data(),
+                                              found.data(), crossing_rule(options), options.bodies == bodies::draw,
+                                              samples.fraction(), crossings, counts});
+}
+
+// Level 0: the sign of the samples, then the crossings of the mesh itself.
+template <class Backend, class Mesh, class VertexShader>
+[[nodiscard]] status remesh_exactly(Backend& backend,
+                                    std::span<const draw<Mesh, VertexShader, constant_output<bool>>> draws,
+                                    const grid& samples, const remesh_options& options, surface<Backend>& out) {
+    solid_options sign = sign_options(options);
+    std::vector<hole_cones> cones;
+    framebuffer<Backend, target<bit, blend::replace>> inside(backend, samples.extent);
+    status result = voxelize_solid(backend, draws, samples, inside, sign);
+    if (!result.ok()) return result;
+    const surface_cells<Backend> cells(backend, get<0>(inside.view().targets).elements, samples.extent);
+    if (cells.are_too_many()) return too_many_vertices(cells.num_vertices());
+    if (options.repair == repair::close_holes && result.counts.triangles_in != 0)
+        cones = run_module(find_holes_tag{}, backend, draws, samples, options.bodies, options.max_hole_edges);
+    typename Backend::template buffer<edge_crossing> crossings(backend, cells.num_edges());
+    if (cells.count() != 0) {
+        typename Backend::template buffer<std::uint64_t> counts(backend,
+                                                                static_cast<std::size_t>(passes::edge_count::count));
+        backend.for_each(counts.size(), passes::clear_counts{counts.data()});
+        const gathered_mesh<Backend> mesh(backend, draws, samples, cones, options.bodies);
+        find_mesh_crossings<0>(backend, cells, mesh, samples, options, crossings.data(), counts.data());
+        find_mesh_crossings<1>(backend, cells, mesh, samples, options, crossings.data(), counts.data());
+        find_mesh_crossings<2>(backend, cells, mesh, samples, options, crossings.data(), counts.data());
+        const std::vector<std::uint64_t> host = counts.to_host(backend);
+        result.surface.cone_crossings = host[static_cast<std::size_t>(passes::edge_count::on_cones)];
+        result.surface.made_crossings = host[static_cast<std::size_t>(passes::edge_count::made)];
+    }
+    return finish_surface(backend, cells, samples, crossings.data(), true, extract_options_of(options), out, result);
+}
+
+// Another level: of the distance.
+template <class Backend, class Mesh, class VertexShader>
+[[nodiscard]] status remesh_level(Backend& backend, std::span<const draw<Mesh, VertexShader, distance>> draws,
+                                  const grid& g, const remesh_options& options, surface<Backend>& out) {
+    const grid samples = sample_grid(g, options.sample);
+    framebuffer<Backend, target<float, blend::replace>> field(backend, samples.extent);
+    const status drawn = voxelize_distance(backend, draws, g, field, level_options(options, g));
+    if (!drawn.ok()) return drawn;
+    if (drawn.counts.triangles_in == 0) { // the field is clear, not far away
+        out = surface<Backend>(backend);
+        out.samples = samples;
+        return drawn;
+    }
+    status result = extract(backend, field, samples, out, extract_options_of(options));
+    result.counts = drawn.counts;
+    result.solid = drawn.solid;
+    result.distance = drawn.distance;
+    return result;
+}
+
+} // namespace core
+
+// Makes a closed manifold mesh around what lies inside of the draws' triangles: sign, then crossings, then sheets, then
+// mesh. The triangles may be open, cross each other, face any way; options say what is inside and what repairs holes.
+// Draws share one type of mesh and vertex shader; draw::fragment_shader is ignored. The surface replaces what `out`
+// holds; out.samples is the grid of the samples, with which vp::position places vertices. Fills status::surface, and
+// counts and solid as voxelize_solid. Nothing inside gives an empty surface, which is ok. Closed meshes within the grid
+// have no made_crossings. Returns after the work is done. A call that fails leaves `out` as it is.
+template <class Backend, class Mesh, class VertexShader, class Shader>
+[[nodiscard]] status remesh(Backend& backend, std::span<const draw<Mesh, VertexShader, Shader>> draws, const grid& g,
+                            surface<Backend>& out, const remesh_options& options = {}) {
+    if constexpr (core::check_vertex_shader<Mesh, VertexShader>()) {
+        if (const status s = validate(g); !s.ok()) return s;
+        if (const status s = core::validate(options, g); !s.ok()) return s;
+        if (const status s = core::validate_draws(draws); !s.ok()) return s;
+        return backend.guard([&]() -> status {
+            if (options.level != 0.0) {
+                std::vector<draw<Mesh, VertexShader, distance>> measured;
+                for (const auto& d : draws) measured.push_back({d.mesh, d.vertex_shader, {}});
+                return core::remesh_level(backend, std::span<const draw<Mesh, VertexShader, distance>>(measured), g,
+                                          options, out);
+            }
+            std::vector<draw<Mesh, VertexShader, constant_output<bool>>> filled;
+            for (const auto& d : draws) filled.push_back({d.mesh, d.vertex_shader, constant(true)});
+            return core::remesh_exactly(backend,
+                                        std::span<const draw<Mesh, VertexShader, constant_output<bool>>>(filled),
+                                        core::sample_grid(g, options.sample), options, out);
+        });
+    } else {
+        return {}; // does not compile: a static_assert has said why
+    }
+}
+
+// One mesh.
+template <class Backend, class... Attributes, class VertexShader>
+[[nodiscard]] status remesh(Backend& backend, const mesh_view<Attributes...>& mesh, const grid& g,
+                            const VertexShader& vertex_shader, surface<Backend>& out,
+                            const remesh_options& options = {}) {
+    using draw_type = draw<mesh_view<Attributes...>, VertexShader, none>;
+    const draw_type d{mesh, vertex_shader, {}};
+    return remesh(backend, std::span<const draw_type>(&d, 1), g, out, options);
+}
+template <class Backend, class... Attributes, class VertexShader>
+[[nodiscard]] status remesh(Backend& backend, const mesh<Backend, Attributes...>& m, const grid& g,
+                            const VertexShader& vertex_shader, surface<Backend>& out,
+                            const remesh_options& options = {}) {
+    return remesh(backend, m.view(), g, vertex_shader, out, options);
+}
+
+// Draws in any contiguous range, such as a std::vector.
+template <class Backend, core::draw_range Draws>
+[[nodiscard]] status remesh(Backend& backend, const Draws& draws, const grid& g, surface<Backend>& out,
+                            const remesh_options& options = {}) {
+    return remesh(backend, std::span<const core::draw_of<Draws>>(std::data(draws), std::size(draws)), g, out, options);
+}
+
+} // namespace voxelpipe
