@@ -173,8 +173,9 @@ template <class Int>
     return {first < last ? first : last, last};
 }
 
-// Calls visit(y, z, i, terms) for each voxel in which a part of the triangle lies, relative to its base: i from lo[0] -
-// 1, which stands for all voxels before the box, to hi[0], for all behind it. With OnlyCount the terms are 0.
+// Calls visit(y, z, i, terms) for each voxel of a pixel in which a part of the triangle lies, relative to its base: i
+// from lo[0] - 1, which stands for all voxels before the box, to hi[0], for all behind it. With OnlyCount the terms are
+// 0.
 VOXELPIPE_ANY_CALLABLE
 template <bool OnlyCount, class Int, class Visit>
 VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_polygon& column, cutting_planes& planes,
@@ -238,9 +239,34 @@ template <class Int>
     return true;
 }
 
+// The same for a triangle within one voxel, in closed form: its cover is exact, and so is the numerator of its volume.
+VOXELPIPE_ANY_CALLABLE
+template <class Int, class Visit>
+VOXELPIPE_HD void visit_only_cell(const cell_triangle<Int>& t, const cell_box& box, Visit&& visit) {
+    for (int axis = 1; axis < 3; ++axis)
+        if (box.lo[axis] > 0 || box.hi[axis] <= 0) return;
+    const auto n = static_cast<std::int64_t>(t.is_odd ? t.n[0] : -t.n[0]); // at most 2^(2F)
+    cell_terms terms{n * (std::int64_t{1} << (cell_unit_bits - 2 * t.fraction - 1)), 0};
+    std::int64_t x = 0;
+    if (box.lo[0] > 0) {
+        x = box.lo[0] - 1;
+    } else if (box.hi[0] <= 0) {
+        x = box.hi[0];
+    } else {
+        const std::int64_t depths = (std::int64_t{3} << t.fraction) - t.p[0][0] - t.p[1][0] - t.p[2][0];
+        const double unit = core::bit_cast<double>(static_cast<std::uint64_t>(1023 - 3 * t.fraction) << 52); // 2^-3F
+        terms.volume = round_to_cell_units(exact::div(exact::mul(exact::to_double(n * depths), unit), 6.0));
+    }
+    visit(std::int64_t{0}, std::int64_t{0}, x, terms);
+}
+
 VOXELPIPE_ANY_CALLABLE
 template <bool OnlyCount, class Int, class Visit>
 VOXELPIPE_HD void for_each_cell(const cell_triangle<Int>& t, const cell_box& box, Visit&& visit) {
+    if (t.reach[0] == 1 && t.reach[1] == 1 && t.reach[2] == 1) {
+        visit_only_cell(t, box, visit);
+        return;
+    }
     cutting_planes planes{};
     const std::int64_t z_first = box.lo[2] > 0 ? box.lo[2] : 0, z_end = box.hi[2] < t.reach[2] ? box.hi[2] : t.reach[2];
     const std::int64_t y_first = box.lo[1] > 0 ? box.lo[1] : 0, y_end = box.hi[1] < t.reach[1] ? box.hi[1] : t.reach[1];

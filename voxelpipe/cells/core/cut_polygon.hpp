@@ -113,8 +113,9 @@ struct corner_fraction {
 };
 
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD corner_fraction<Int> corner_minus(const cell_triangle<Int>& t, const cutting_planes& planes,
-                                                             int from, int to, int axis, std::int64_t place) {
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE corner_fraction<Int> corner_minus(const cell_triangle<Int>& t,
+                                                                              const cutting_planes& planes, int from,
+                                                                              int to, int axis, std::int64_t place) {
     if (from < first_plane_side && to < first_plane_side) { // edges i - 1 and i meet in vertex i
         const int v = (from + 1) % 3 == to ? to : from;
         return {static_cast<Int>(t.p[v][axis] - place), 1};
