@@ -38,6 +38,8 @@ enum class status_code : std::uint8_t {
     bad_count,            // a geometry program emitted more triangles than its type holds
     bad_subset,           // mesh_view::part: not one number a triangle, or not ascending below `whole`
     other_rank_failed,    // slabs/: this part of the work has not failed, that of another rank or GPU has
+    bad_cell_options,     // an option of voxelize_cells is out of its range
+    winding_too_large,    // voxelize_cells: the covers of a row's pixels may sum to more than 2^18 pixels
     crop_without_whole,   // repair::exterior of a crop: what lies outside follows from the whole grid
     no_device,            // cuda_backend without a usable device
     device_error,         // `device_error` holds the CUDA error
@@ -137,6 +139,26 @@ struct surface_counters {
     friend bool operator==(const surface_counters&, const surface_counters&) = default;
 };
 
+// What voxelize_cells counts besides `counters`; zeros from other calls. Volumes are multiples of 2^-44 of a voxel.
+struct cell_counters {
+    // The sum of the fractions of the call's voxels, of all bodies: the lower 64 bits of a signed number of 128 bits,
+    // and the upper ones.
+    std::uint64_t volume_low = 0;
+    std::int64_t volume_high = 0;
+    std::uint64_t cut_voxels = 0;   // voxels that a triangle's inside reaches; with bodies::draw once a draw
+    std::uint64_t below_zero = 0;   // fractions below -2^-24
+    std::uint64_t above_one = 0;    // fractions above 1 + 2^-24
+    std::uint64_t open_rows = 0;    // rows along the axis whose covers do not sum to 0
+    std::uint64_t open_edges = 0;   // snapped edges that no opposite edge cancels; 0 if they were not counted
+    std::uint64_t cell_records = 0; // parts of triangles in voxels, before and behind the grid
+
+    // The volume in voxels, rounded to double.
+    [[nodiscard]] double volume() const {
+        return static_cast<double>(volume_high) * 0x1p20 + static_cast<double>(volume_low) * 0x1p-44;
+    }
+    friend bool operator==(const cell_counters&, const cell_counters&) = default;
+};
+
 // Sizes that a caller's workspace or limits must have; set if `code` is capacity_exceeded.
 struct required_sizes {
     std::uint64_t tile_pairs = 0;         // as workspace_limits
@@ -197,6 +219,10 @@ struct required_sizes {
         return "bad subset: a mesh's part needs one number a triangle, ascending and below the whole";
     case status_code::other_rank_failed:
         return "another rank or GPU failed: this one's part is not to be used";
+    case status_code::bad_cell_options:
+        return "bad cell options: a value out of its range";
+    case status_code::winding_too_large:
+        return "winding too large: the covers of a row sum to more than 2^18 pixels";
     case status_code::crop_without_whole:
         return "crop without whole: the exterior of a part of a mesh follows from all of it, draw a grid that holds "
                "that";
@@ -241,6 +267,7 @@ struct [[nodiscard]] status {
     solid_counters solid{};                                     // of voxelize_solid, and of a distance's sign
     distance_counters distance{};                               // of voxelize_distance and distance_at
     surface_counters surface{};                                 // of extract and remesh
+    cell_counters cells{};                                      // of voxelize_cells
     required_sizes required{};                                  // if the capacity did not suffice
     static constexpr std::uint32_t unknown = ~std::uint32_t{0}; // no draw or triangle is named
     std::uint32_t draw = unknown; // of index_out_of_range: the first such triangle and its draw, if voxelize returns

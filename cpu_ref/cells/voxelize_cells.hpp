@@ -1,0 +1,27 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// voxelize_cells on CPU threads: run_module of core::cells_tag.
+
+#include <cpu_ref/cpu_backend.hpp>
+#include <voxelpipe/cells/passes/cell_passes.hpp>
+
+#include <cstdint>
+#include <span>
+
+namespace voxelpipe::core {
+
+// Implements voxelize_cells. Arguments are validated. Exceptions of a user's shader pass through.
+template <class Mesh, class VertexShader, class CellShader, class... Targets>
+[[nodiscard]] status
+run_module(cells_tag, cpu_backend& backend, std::span<const draw<Mesh, VertexShader, CellShader>> draws, const grid& g,
+           const framebuffer_view<Targets...>& fb, const cell_options& options, std::uint64_t triangles_in) {
+    if (!cpu::are_numbered(draws)) return failure(status_code::bad_subset);
+    return backend.guarded(triangles_in, [&](const cpu::execution& how) {
+        how.enter(stage::coarse_raster);
+        return run_cells(backend, draws, g, fb, options, triangles_in);
+    });
+}
+
+} // namespace voxelpipe::core

@@ -1,0 +1,106 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// Cut cells on the device: the bytes and counters of cpu_backend, for triangles of all sizes, by all axes, of parts of
+// a grid, for bodies and blends.
+#include "device_test.hpp"
+#include "solid_drawings.hpp"
+
+#include <voxelpipe/cells/device/cells.cuh>
+
+#include <cpu_ref/cells/voxelize_cells.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace {
+
+namespace vp = voxelpipe;
+using device_test::mesh_data;
+
+// All that a fragment has, and a discard.
+struct everything {
+    std::uint32_t id;
+    VOXELPIPE_HD auto operator()(const vp::cell_fragment& f) const {
+        const auto hash = static_cast<std::uint32_t>(f.voxel.x * 73 + f.voxel.y * 179 + f.voxel.z * 283) + f.draw + id;
+        return vp::outputs(f.fraction, f.units, f.aperture, f.next_aperture, f.is_cut).discard_if(hash % 13 == 5);
+    }
+};
+template <class Backend>
+using every_target =
+    vp::framebuffer<Backend, vp::target<float, vp::blend::add>, vp::target<std::int64_t, vp::blend::replace>,
+                    vp::target<std::int64_t, vp::blend::max>, vp::target<std::int64_t, vp::blend::min>,
+                    vp::target<vp::bit, vp::blend::bit_or>>;
+template <class Backend>
+using one_target = vp::framebuffer<Backend, vp::target<float, vp::blend::replace>>;
+
+template <class Backend, class Framebuffer, class Shader>
+vp::status draw(Backend& be, const std::vector<mesh_data>& meshes, const vp::grid& g, const Shader& shader,
+                Framebuffer& fb, const vp::cell_options& o) {
+    std::vector<vp::mesh<Backend>> on_backend;
+    for (const mesh_data& m : meshes) on_backend.emplace_back(be, m.positions, m.triangles);
+    std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, Shader>> draws;
+    for (const auto& m : on_backend) draws.push_back({m.view(), {}, shader});
+    return vp::voxelize_cells(be, draws, g, fb, o);
+}
+
+template <class Framebuffer>
+inline constexpr std::size_t num_targets = 0;
+template <class Backend, class... Targets>
+inline constexpr std::size_t num_targets<vp::framebuffer<Backend, Targets...>> = sizeof...(Targets);
+
+template <template <class> class Framebuffer, class Shader>
+void expect_same(const std::vector<mesh_data>& meshes, const vp::grid& g, const Shader& shader,
+                 const vp::cell_options& o = {}) {
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    Framebuffer<vp::cpu_backend> a(cpu, g.extent);
+    Framebuffer<vp::cuda_backend> b(gpu, g.extent);
+    const vp::status expected = draw(cpu, meshes, g, shader, a, o), found = draw(gpu, meshes, g, shader, b, o);
+    ASSERT_TRUE(expected.ok()) << expected.message();
+    ASSERT_TRUE(found.ok()) << found.message();
+    EXPECT_EQ(expected.counts, found.counts);
+    EXPECT_TRUE(expected.cells == found.cells);
+    EXPECT_GT(expected.cells.cut_voxels, 0u);
+    vp::core::for_each_index<num_targets<Framebuffer<vp::cpu_backend>>>([&]<std::size_t I>() {
+        const std::string what = "target " + std::to_string(I);
+        device_test::expect_same_bytes(vp::get<I>(a).to_host(cpu), vp::get<I>(b).to_host(gpu), what.c_str());
+    });
+}
+
+TEST(DeviceCells, TrianglesOfAllSizesHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{33, 26, 21};
+    mesh_data m = device_test::mixed_triangles(120, 25, 5);
+    device_test::append(m, device_test::long_triangles(extent, 12, 3));
+    for (int axis = 0; axis < 3; ++axis)
+        expect_same<every_target>({m}, device_test::box_grid(extent), everything{3}, {.axis = axis});
+    expect_same<one_target>({m}, device_test::box_grid(extent), vp::fraction{});
+}
+
+// Closed bodies with faces in the lattice's planes, in several draws, and parts of a grid.
+TEST(DeviceCells, BodiesAndPartsOfGridsHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{40, 21, 35};
+    mesh_data bodies = device_test::tied_bodies(30, 8, 2);
+    const std::vector<mesh_data> meshes{bodies, device_test::ball({17, 9, 14}, 6.3f, 7)};
+    vp::grid flat = device_test::box_grid(extent);
+    flat.voxel_size = {0.5f, 1.25f, 0.75f};
+    for (const vp::bodies b : {vp::bodies::call, vp::bodies::draw})
+        for (const vp::grid& g : {device_test::box_grid(extent), flat, flat.crop({5, 3, 2}, {29, 14, 31})})
+            expect_same<every_target>(meshes, g, everything{1}, {.bodies = b, .axis = b == vp::bodies::draw ? 1 : 0});
+}
+
+TEST(DeviceCells, NothingAndBadIndices) {
+    vp::cuda_backend gpu;
+    const vp::grid g = device_test::box_grid(glm::ivec3(5));
+    one_target<vp::cuda_backend> fb(gpu, g.extent);
+    EXPECT_TRUE(draw(gpu, {}, g, vp::fraction{}, fb, {}).ok());
+    mesh_data m = device_test::ball({2, 2, 2}, 1.5f, 4);
+    m.triangles.push_back({0, 1, 1000000});
+    EXPECT_EQ(draw(gpu, {m}, g, vp::fraction{}, fb, {}).code, vp::status_code::index_out_of_range);
+    for (const float f : vp::get<0>(fb).to_host(gpu)) EXPECT_EQ(f, 0.0f);
+}
+
+} // namespace

@@ -1,0 +1,150 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Cut cells: voxelize_cells draws how much of each voxel is inside, as multiples of 2^-44, into a framebuffer, on the
+// backend whose tag is passed (docs/design.md, "Cut cells"). A voxel that a triangle cuts, or that is inside, gets one
+// fragment. The same draws, vertex shaders, targets, blends, layouts, crops and checks of arguments as voxelize.
+
+#include <voxelpipe/cells/core/cell_terms.hpp>
+#include <voxelpipe/solid/solid.hpp>
+#include <voxelpipe/voxelize.hpp>
+
+#include <glm/vec3.hpp>
+
+#include <cstdint>
+#include <span>
+#include <type_traits>
+
+namespace voxelpipe {
+
+// Written {.bodies = bodies::draw}.
+struct cell_options {
+    voxelpipe::bodies bodies = voxelpipe::bodies::call; // one body, or one for each draw
+    // The axis that rows run along, 0 to 2: that of cell_fragment::aperture and of open_rows. On closed meshes the
+    // fraction is the same by all axes within the bound of errors, and to the last bit where no triangle is.
+    int axis = 0;
+    bool count_voxels = true;     // fill counters::voxels
+    bool count_open_edges = true; // fill cell_counters::open_edges, which sorts all edges
+};
+
+// One voxel of one body: what a cell's shader gets. Units are u = 2^-44 of the voxel, or of its face.
+struct cell_fragment {
+    glm::ivec3 voxel;           // index in the whole grid
+    std::uint32_t draw;         // which draw of the call; 0 with bodies::call
+    bool is_cut;                // the inside of the voxel, or its upper face along the axis, meets a triangle
+    float fraction;             // the units' nearest float: 1 inside, 0 outside; neither clamped nor snapped
+    std::int64_t units;         // the integral of the winding number over the voxel
+    std::int64_t aperture;      // the same over its lower face along the axis
+    std::int64_t next_aperture; // over its upper face; aperture - next_aperture is the axis' component of the mesh's
+                                // area within the voxel, to the last bit
+};
+
+// Cell shader that returns the fraction: into one target of float.
+struct fraction {
+    // The fragment's fraction.
+    VOXELPIPE_HD output<float> operator()(const cell_fragment& f) const { return outputs(f.fraction); }
+};
+
+namespace core {
+
+// Names the call of this module. A backend implements voxelize_cells as run_module(cells_tag, backend, draws, grid,
+// framebuffer_view, options, number of triangles).
+struct cells_tag {};
+
+template <class CellShader>
+using cell_output = std::remove_cvref_t<std::invoke_result_t<const CellShader&, const cell_fragment&>>;
+
+// True where both shaders can be used with the mesh; otherwise one readable line says why not.
+template <class Mesh, class VertexShader, class CellShader>
+[[nodiscard]] constexpr bool check_cell_shaders() {
+    if constexpr (check_vertex_shader<Mesh, VertexShader>()) {
+        constexpr bool copyable = std::is_trivially_copyable_v<CellShader>;
+        static_assert(copyable, "voxelpipe: a cell's shader must be trivially copyable");
+        constexpr bool callable = std::is_invocable_v<const CellShader&, const cell_fragment&>;
+        static_assert(callable, "voxelpipe: the cell's shader cannot be called with const cell_fragment& (is its "
+                                "operator() const? a cell has no barycentrics, normals or varyings)");
+        if constexpr (copyable && callable) {
+            constexpr bool gives_output = is_output<cell_output<CellShader>>;
+            static_assert(gives_output,
+                          "voxelpipe: a cell's shader must return vp::outputs(...), one value per render target; one "
+                          "for the device only spells vp::output<T...> instead of auto");
+            return gives_output;
+        }
+    }
+    return false;
+}
+template <class Mesh, class VertexShader, class CellShader, class... Targets>
+[[nodiscard]] constexpr bool cell_fits_targets() {
+    if constexpr (check_cell_shaders<Mesh, VertexShader, CellShader>())
+        return output_check<cell_output<CellShader>>::template fits_targets<Targets...>();
+    return false;
+}
+
+[[nodiscard]] inline status validate(const cell_options& o) {
+    const bool known = o.bodies <= bodies::draw && o.axis >= 0 && o.axis <= 2;
+    return known ? status{} : failure(status_code::bad_cell_options);
+}
+
+} // namespace core
+
+// Draws the fractions of voxels that are inside into render targets: the integral of the winding number over the voxel,
+// which for outward bodies that do not overlap is the volume inside, 0 to 1. Overlapping parts add up, inverted ones
+// count negative; status::cells tells how many fractions are no 0 to 1. The draws share one type of mesh, vertex shader
+// and cell shader; draw::fragment_shader is the cell's shader, called with a cell_fragment: that of draw 0 with
+// bodies::call, each draw's own with bodies::draw. On a closed mesh a voxel that no triangle touches has its integer
+// exactly, and the sum of all is the mesh's volume up to roundings of 2^-44. An open mesh is defined by rows along the
+// axis, from the low end. Triangles count as outside iff they miss the grid's intervals along the two other axes.
+// Without any triangles it clears, as vp::clear does. Returns after the work is done. Fails with winding_too_large, and
+// writes nothing, where 2^19 triangles or more could wrap the sums of a row.
+template <class Backend, class Mesh, class VertexShader, class CellShader, class... Targets>
+[[nodiscard]] status voxelize_cells(Backend& backend, std::span<const draw<Mesh, VertexShader, CellShader>> draws,
+                                    const grid& g, const framebuffer_view<Targets...>& fb,
+                                    const cell_options& options = {}) {
+    if constexpr (core::cell_fits_targets<Mesh, VertexShader, CellShader, Targets...>()) {
+        if (const status s = validate(g); !s.ok()) return s;
+        if (const status s = core::validate(options); !s.ok()) return s;
+        if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
+        const status s = core::validate_draws(draws);
+        if (!s.ok()) return s;
+        if (s.counts.triangles_in == 0) return backend.clear(fb);
+        return core::name_bad_triangle(
+            backend, draws, run_module(core::cells_tag{}, backend, draws, g, fb, options, s.counts.triangles_in));
+    } else {
+        return {}; // does not compile: a static_assert has said why
+    }
+}
+
+template <class Backend, class Mesh, class VertexShader, class CellShader, class... Targets>
+[[nodiscard]] status voxelize_cells(Backend& backend, std::span<const draw<Mesh, VertexShader, CellShader>> draws,
+                                    const grid& g, framebuffer<Backend, Targets...>& fb,
+                                    const cell_options& options = {}) {
+    return voxelize_cells(backend, draws, g, fb.view(), options);
+}
+
+// One mesh, into a framebuffer or a framebuffer_view.
+template <class Backend, class... Attributes, class VertexShader, class CellShader, class Output>
+[[nodiscard]] status voxelize_cells(Backend& backend, const mesh_view<Attributes...>& mesh, const grid& g,
+                                    const VertexShader& vertex_shader, const CellShader& cell_shader, Output&& out,
+                                    const cell_options& options = {}) {
+    using draw_type = draw<mesh_view<Attributes...>, VertexShader, CellShader>;
+    const draw_type d{mesh, vertex_shader, cell_shader};
+    return voxelize_cells(backend, std::span<const draw_type>(&d, 1), g, out, options);
+}
+
+template <class Backend, class... Attributes, class VertexShader, class CellShader, class Output>
+[[nodiscard]] status voxelize_cells(Backend& backend, const mesh<Backend, Attributes...>& m, const grid& g,
+                                    const VertexShader& vertex_shader, const CellShader& cell_shader, Output&& out,
+                                    const cell_options& options = {}) {
+    return voxelize_cells(backend, m.view(), g, vertex_shader, cell_shader, out, options);
+}
+
+// Draws in any contiguous range, such as a std::vector.
+template <class Backend, core::draw_range Draws, class Output>
+[[nodiscard]] status voxelize_cells(Backend& backend, const Draws& draws, const grid& g, Output&& out,
+                                    const cell_options& options = {}) {
+    return voxelize_cells(backend, std::span<const core::draw_of<Draws>>(std::data(draws), std::size(draws)), g, out,
+                          options);
+}
+
+} // namespace voxelpipe

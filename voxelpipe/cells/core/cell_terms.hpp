@@ -1,0 +1,310 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What one triangle adds to the voxels of its rows, in multiples of u = 2^-44: covers of pixels by edge terms, covers
+// before planes, and the volume in front of a voxel's upper face. Rows run along x; a pixel is a square of y and z
+// (docs/design.md, "Cut cells").
+
+#include <voxelpipe/cells/core/cut_polygon.hpp>
+
+#include <cstdint>
+
+namespace voxelpipe::core {
+
+inline constexpr int cell_unit_bits = 44; // u = 2^-44 of a voxel, or of a voxel's face
+
+// R[v]: the nearest multiple of u, halves away from 0, for |v| < 2^18.
+[[nodiscard]] VOXELPIPE_HD inline std::int64_t round_to_cell_units(double v) {
+    const double magnitude = exact::fma(v < 0.0 ? -v : v, 0x1p44, 0.5);
+    const auto units = static_cast<std::int64_t>(magnitude);
+    return v < 0.0 ? -units : units;
+}
+
+// The edge term of a pixel, from a vertex to a later one: R[integral over the edge's z in [k, k + 1] of min(max(j + 1 -
+// y(z), 0), 1) dz], negative if z falls. A function of the edge and the pixel alone. y and z: the pixel's lowest corner
+// in the triangle's units.
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD std::int64_t edge_term(const cell_triangle<Int>& t, int first, int last, std::int64_t y,
+                                                  std::int64_t z) {
+    const std::int64_t size = std::int64_t{1} << t.fraction;
+    const bool falls = t.p[last][2] < t.p[first][2];
+    const int low = falls ? last : first, high = falls ? first : last;
+    const std::int64_t y0 = t.p[low][1] - y, z0 = t.p[low][2] - z, y1 = t.p[high][1] - y, z1 = t.p[high][2] - z;
+    const std::int64_t begin = z0 > 0 ? z0 : 0, end = z1 < size ? z1 : size;
+    if (begin >= end) return 0;
+    const auto sign = [&](std::int64_t term) { return falls ? -term : term; };
+    // A height is a multiple of 2^-F, the part of an edge within the pixel one of 2^-(2F + 1).
+    const auto height = [&](std::int64_t h) { return h << (cell_unit_bits - t.fraction); };
+    if (y0 >= size && y1 >= size) return 0;
+    if (y0 <= 0 && y1 <= 0) return sign(height(end - begin));
+    const bool is_within = y0 >= 0 && y0 <= size && y1 >= 0 && y1 <= size;
+    if (is_within && begin == z0 && end == z1)
+        return sign((2 * size - y0 - y1) * (end - begin) << (cell_unit_bits - 2 * t.fraction - 1));
+
+    // y at a z, times the edge's height: exact.
+    const auto rise = static_cast<Int>(z1 - z0), run = static_cast<Int>(y1 - y0);
+    const auto y_at = [&](std::int64_t at) { return static_cast<Int>(y0) * rise + run * static_cast<Int>(at - z0); };
+    const Int y_begin = y_at(begin), y_end = y_at(end), whole = static_cast<Int>(size) * rise;
+    if (y_begin >= whole && y_end >= whole) return 0;
+    if (y_begin <= 0 && y_end <= 0) return sign(height(end - begin));
+    const double voxel = core::bit_cast<double>(static_cast<std::uint64_t>(1023 - t.fraction) << 52); // 2^-F
+    // z, in voxels, where y is that of a side of the pixel, within the edge's part.
+    const auto z_at = [&](std::int64_t side) {
+        const Int n = static_cast<Int>(z0) * run + rise * static_cast<Int>(side - y0);
+        const double at = exact::div(exact::mul(exact::to_double(n), voxel), exact::to_double(run));
+        const double lo = exact::mul(exact::to_double(begin), voxel), hi = exact::mul(exact::to_double(end), voxel);
+        return at < lo ? lo : at > hi ? hi : at;
+    };
+    const auto y_in_voxels = [&](Int y_times_rise) {
+        return exact::div(exact::mul(exact::to_double(y_times_rise), voxel), exact::to_double(rise));
+    };
+    double from = exact::mul(exact::to_double(begin), voxel), to = exact::mul(exact::to_double(end), voxel);
+    double beside = 0.0; // height of the part that lies below the pixel in y
+    double f_from = 0.0, f_to = 0.0;
+    if (y_begin <= 0) { // crosses the lower side upward
+        const double at = z_at(0);
+        beside = at - from;
+        from = at;
+        f_from = 1.0;
+    } else if (y_begin >= whole) {
+        from = z_at(size);
+    } else {
+        f_from = 1.0 - y_in_voxels(y_begin);
+    }
+    if (y_end <= 0) {
+        const double at = z_at(0);
+        beside = to - at;
+        to = at;
+        f_to = 1.0;
+    } else if (y_end >= whole) {
+        to = z_at(size);
+    } else {
+        f_to = 1.0 - y_in_voxels(y_end);
+    }
+    return sign(round_to_cell_units(exact::fma(to - from, exact::mul(f_from + f_to, 0.5), beside)));
+}
+
+// The cover of a pixel by a triangle, positive where n_x < 0: the sum of its three edge terms, of the sorted triangle.
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD std::int64_t pixel_cover(const cell_triangle<Int>& t, std::int64_t y, std::int64_t z) {
+    return edge_term(t, 0, 1, y, z) + edge_term(t, 1, 2, y, z) - edge_term(t, 0, 2, y, z);
+}
+
+// A polygon within a pixel: minus its area in the projection, positive where n_x < 0; and minus the integral of the
+// distance along x to the plane at x_place, which lies no further than a voxel.
+struct polygon_sums {
+    double cover, volume;
+};
+template <bool WithVolume, class Int>
+[[nodiscard]] VOXELPIPE_HD polygon_sums sum_polygon(const cell_triangle<Int>& t, const cutting_planes& planes,
+                                                    const cut_polygon& poly, std::int64_t y, std::int64_t z,
+                                                    std::int64_t x_place) {
+    polygon_sums s{0.0, 0.0};
+    if (poly.count < 3) return s;
+    const auto x_of = [&](int i) {
+        if constexpr (WithVolume)
+            return -corner_value(t, planes, poly, i, 0, x_place);
+        else
+            return 0.0;
+    };
+    const double y0 = corner_value(t, planes, poly, 0, 1, y), z0 = corner_value(t, planes, poly, 0, 2, z), x0 = x_of(0);
+    double dy = corner_value(t, planes, poly, 1, 1, y) - y0, dz = corner_value(t, planes, poly, 1, 2, z) - z0;
+    double x1 = x_of(1);
+    for (int i = 2; i < poly.count; ++i) {
+        const double ey = corner_value(t, planes, poly, i, 1, y) - y0, ez = corner_value(t, planes, poly, i, 2, z) - z0;
+        const double x2 = x_of(i);
+        const double twice = exact::fma(dz, ey, -exact::mul(dy, ez));
+        s.cover = exact::fma(twice, 0.5, s.cover);
+        if constexpr (WithVolume) s.volume = exact::fma(twice, x0 + x1 + x2, s.volume);
+        dy = ey;
+        dz = ez;
+        x1 = x2;
+    }
+    if constexpr (WithVolume) s.volume = exact::div(s.volume, 6.0);
+    return s;
+}
+
+// What a triangle adds to a row: to the cover before the voxel's upper face, and to the volume within the voxel.
+struct cell_terms {
+    std::int64_t cover, volume; // a and c, in u
+};
+
+// The pixels and voxels of a crop, in the triangle's units.
+struct cell_box {
+    std::int64_t lo[3], hi[3]; // voxels, relative to the triangle's base; `hi` is one more than the last
+};
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD cell_box make_cell_box(const cell_triangle<Int>& t, const std::int64_t (&extent)[3]) {
+    cell_box b{};
+    for (int i = 0; i < 3; ++i) {
+        b.lo[i] = -t.base[i];
+        b.hi[i] = extent[i] - t.base[i];
+    }
+    return b;
+}
+
+// Voxels along x that a polygon's part in its pixel column meets: those whose open interval (i, i + 1] it reaches.
+struct cell_span {
+    std::int64_t first, last;
+};
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD cell_span span_of(const cell_triangle<Int>& t, const cutting_planes& planes,
+                                             const cut_polygon& poly) {
+    double lo = 0.0, hi = 0.0;
+    for (int i = 0; i < poly.count; ++i) {
+        const double x = corner_value(t, planes, poly, i, 0, 0);
+        lo = i == 0 || x < lo ? x : lo;
+        hi = i == 0 || x > hi ? x : hi;
+    }
+    // Within 2^-10 of a lattice plane exact signs decide.
+    const auto floor_of = [](double v) {
+        const auto n = static_cast<std::int64_t>(v);
+        return n - static_cast<std::int64_t>(static_cast<double>(n) > v);
+    };
+    const auto all = [&](std::int64_t plane, int sign) { // sign 1: no corner below the plane, -1: none above
+        for (int i = 0; i < poly.count; ++i)
+            if (corner_side(t, planes, poly, i, 0, plane << t.fraction) * sign < 0) return false;
+        return true;
+    };
+    std::int64_t first = floor_of(lo - 0x1p-10), last = -floor_of(-hi - 0x1p-10) - 1;
+    if (floor_of(lo + 0x1p-10) != first && all(first + 1, 1)) ++first;
+    if (-floor_of(-hi + 0x1p-10) - 1 != last && all(last, -1)) --last;
+    return {first < last ? first : last, last};
+}
+
+// Calls visit(y, z, i, terms) for each voxel of a pixel in which a part of the triangle lies, relative to its base: i
+// from lo[0] - 1, which stands for all voxels before the box, to hi[0], for all behind it. With OnlyCount the terms are
+// 0.
+VOXELPIPE_ANY_CALLABLE
+template <bool OnlyCount, class Int, class Visit>
+VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_polygon& column, cutting_planes& planes,
+                                         const cell_box& box, std::int64_t j, std::int64_t k, Visit&& visit) {
+    const std::int64_t y = j << t.fraction, z = k << t.fraction;
+    const auto oriented = [&](std::int64_t v) { return t.is_odd ? -v : v; };
+    const std::int64_t cover = OnlyCount ? 0 : oriented(pixel_cover(t, y, z));
+    cell_span span{-1, -1}; // in the lower plane of the lowest voxel
+    if (t.reach[0] > 1)
+        span = span_of(t, planes, column);
+    else
+        for (int c = 0; c < column.count; ++c)
+            if (corner_side(t, planes, column, c, 0, 0) > 0) span = {0, 0};
+    const std::int64_t before_box = box.lo[0] - 1;
+    std::int64_t so_far = 0; // B at the lower face of the next voxel
+    std::int64_t i = span.first;
+    if (i < box.lo[0]) i = before_box;
+    while (true) {
+        if (i >= box.hi[0]) { // all that lies behind
+            visit(j, k, box.hi[0], cell_terms{cover - so_far, 0});
+            return;
+        }
+        const std::int64_t upper = i + 1;
+        const bool is_last = upper > span.last;
+        cut_polygon lower = column;
+        planes.at[1] = upper << t.fraction;
+        cell_terms terms{0, 0};
+        if (!OnlyCount) {
+            if (!is_last) cut(t, planes, 1, true, lower);
+            const std::int64_t before =
+                is_last ? cover : oriented(round_to_cell_units(sum_polygon<false>(t, planes, lower, y, z, 0).cover));
+            terms.cover = before - so_far;
+            so_far = before;
+            if (i != before_box) {
+                if (i != span.first) {
+                    planes.at[0] = i << t.fraction;
+                    cut(t, planes, 0, false, lower);
+                }
+                terms.volume =
+                    oriented(round_to_cell_units(sum_polygon<true>(t, planes, lower, y, z, planes.at[1]).volume));
+            }
+        }
+        visit(j, k, i, terms);
+        if (is_last) return;
+        i = upper;
+    }
+}
+
+// True if a polygon that was cut to a pixel meets its inside.
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD bool meets_inside(const cell_triangle<Int>& t, const cutting_planes& planes,
+                                             const cut_polygon& poly) {
+    for (int plane = 2; plane < 6; ++plane) {
+        bool has_any = false;
+        for (int i = 0; i < poly.count; ++i) {
+            const int s = corner_side(t, planes, poly, i, plane / 2, planes.at[plane]);
+            has_any = has_any || (plane % 2 == 0 ? s > 0 : s < 0);
+        }
+        if (!has_any) return false;
+    }
+    return true;
+}
+
+// The same for a triangle within one voxel, in closed form: its cover is exact, and so is the numerator of its volume.
+VOXELPIPE_ANY_CALLABLE
+template <class Int, class Visit>
+VOXELPIPE_HD void visit_only_cell(const cell_triangle<Int>& t, const cell_box& box, Visit&& visit) {
+    for (int axis = 1; axis < 3; ++axis)
+        if (box.lo[axis] > 0 || box.hi[axis] <= 0) return;
+    const auto n = static_cast<std::int64_t>(t.is_odd ? t.n[0] : -t.n[0]); // at most 2^(2F)
+    cell_terms terms{n * (std::int64_t{1} << (cell_unit_bits - 2 * t.fraction - 1)), 0};
+    std::int64_t x = 0;
+    if (box.lo[0] > 0) {
+        x = box.lo[0] - 1;
+    } else if (box.hi[0] <= 0) {
+        x = box.hi[0];
+    } else {
+        const std::int64_t depths = (std::int64_t{3} << t.fraction) - t.p[0][0] - t.p[1][0] - t.p[2][0];
+        const double unit = core::bit_cast<double>(static_cast<std::uint64_t>(1023 - 3 * t.fraction) << 52); // 2^-3F
+        terms.volume = round_to_cell_units(exact::div(exact::mul(exact::to_double(n * depths), unit), 6.0));
+    }
+    visit(std::int64_t{0}, std::int64_t{0}, x, terms);
+}
+
+VOXELPIPE_ANY_CALLABLE
+template <bool OnlyCount, class Int, class Visit>
+VOXELPIPE_HD void for_each_cell(const cell_triangle<Int>& t, const cell_box& box, Visit&& visit) {
+    if (t.reach[0] == 1 && t.reach[1] == 1 && t.reach[2] == 1) {
+        visit_only_cell(t, box, visit);
+        return;
+    }
+    cutting_planes planes{};
+    const std::int64_t z_first = box.lo[2] > 0 ? box.lo[2] : 0, z_end = box.hi[2] < t.reach[2] ? box.hi[2] : t.reach[2];
+    const std::int64_t y_first = box.lo[1] > 0 ? box.lo[1] : 0, y_end = box.hi[1] < t.reach[1] ? box.hi[1] : t.reach[1];
+    for (std::int64_t k = z_first; k < z_end; ++k) {
+        cut_polygon layer = whole_triangle();
+        std::int64_t j_first = y_first, j_end = y_end;
+        planes.at[4] = k << t.fraction;
+        planes.at[5] = (k + 1) << t.fraction;
+        if (t.reach[2] > 1) {
+            cut(t, planes, 4, false, layer);
+            cut(t, planes, 5, true, layer);
+            if (layer.count == 0) continue;
+            if (t.reach[1] > 2) { // the pixels between the layer's ends, and one beyond where these are close to a side
+                double lo = 0.0, hi = 0.0;
+                for (int i = 0; i < layer.count; ++i) {
+                    const double y = corner_value(t, planes, layer, i, 1, 0);
+                    lo = i == 0 || y < lo ? y : lo;
+                    hi = i == 0 || y > hi ? y : hi;
+                }
+                const auto first = static_cast<std::int64_t>(lo - 0x1p-10),
+                           end = static_cast<std::int64_t>(hi + 0x1p-10) + 1;
+                j_first = first > j_first ? first : j_first;
+                j_end = end < j_end ? end : j_end;
+            }
+        }
+        for (std::int64_t j = j_first; j < j_end; ++j) {
+            cut_polygon column = layer;
+            planes.at[2] = j << t.fraction;
+            planes.at[3] = (j + 1) << t.fraction;
+            if (t.reach[1] > 1) {
+                cut(t, planes, 2, false, column);
+                cut(t, planes, 3, true, column);
+            }
+            if (t.reach[1] > 1 || t.reach[2] > 1)
+                if (!meets_inside(t, planes, column)) continue;
+            for_each_cell_of_pixel<OnlyCount>(t, column, planes, box, j, k, visit);
+        }
+    }
+}
+
+} // namespace voxelpipe::core

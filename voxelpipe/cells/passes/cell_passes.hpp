@@ -1,0 +1,207 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// voxelize_cells on any backend: list the terms of all triangles, sort them by row and voxel, sum and shade the rows.
+
+#include <voxelpipe/cells/passes/cell_rows.hpp>
+#include <voxelpipe/programs/passes/fragment_pool.hpp>
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe::core {
+
+// (along the rows, the two other axes) of (x, y, z).
+[[nodiscard]] inline glm::ivec3 turn(const glm::ivec3& p, int axis) {
+    return axis == 0 ? p : axis == 1 ? glm::ivec3(p.y, p.z, p.x) : glm::ivec3(p.z, p.x, p.y);
+}
+
+// The triangles of a call, and what its passes count.
+template <class Backend>
+class cell_scene {
+    template <class T>
+    using buffer = typename Backend::template buffer<T>;
+    static constexpr std::array<std::uint64_t, index_of(cell_count::size)> zeros{};
+
+public:
+    // Runs the vertex shaders. Triangles are at most 2^32 - 1. Waits.
+    template <class Draw>
+    cell_scene(Backend& backend, std::span<const Draw> draws, const grid& g, int axis)
+        : backend_(backend), counts_(backend, array_view<const std::uint64_t>(zeros.data(), zeros.size())),
+          positions_(backend, num_vertices(draws)), triangles_(backend, num_triangles(draws)),
+          first_triangle_(backend, first_triangles(draws)), fraction_(g.fraction()), extent_(turn(g.extent, axis)) {
+        const snap_transform snap = make_snap_transform(g);
+        std::uint64_t first_vertex = 0, first_triangle = 0;
+        for (std::size_t d = 0; d < draws.size(); ++d) {
+            const auto& mesh = draws[d].mesh;
+            using mesh_type = std::remove_cvref_t<decltype(mesh)>;
+            using shader_type = std::remove_cvref_t<decltype(draws[d].vertex_shader)>;
+            const std::uint64_t vertices = mesh.positions.size() * mesh.copies.count;
+            const std::uint64_t triangles = mesh.triangles.size() * mesh.copies.count;
+            backend.for_each(vertices, passes::snap_vertices<mesh_type, shader_type>{
+                                           mesh, draws[d].vertex_shader, static_cast<std::uint32_t>(d), snap, axis,
+                                           positions_.data() + first_vertex});
+            backend.for_each(triangles, passes::join_triangles{elements_of<mesh_type>::indices(mesh),
+                                                               static_cast<std::uint32_t>(first_vertex),
+                                                               triangles_.data() + first_triangle, counts_.data()});
+            first_vertex += vertices;
+            first_triangle += triangles;
+        }
+    }
+
+    [[nodiscard]] passes::cell_mesh mesh() const {
+        return {positions_.data(),
+                triangles_.data(),
+                first_triangle_.data(),
+                static_cast<std::uint32_t>(first_triangle_.size()),
+                static_cast<std::uint32_t>(triangles_.size()),
+                fraction_,
+                extent_};
+    }
+    [[nodiscard]] std::uint64_t* counts() { return counts_.data(); }
+    [[nodiscard]] std::vector<std::uint64_t> read_counts() const { return counts_.to_host(backend_); }
+    [[nodiscard]] const glm::ivec3& extent() const { return extent_; } // turned
+
+    void count_open_edges() {
+        const std::uint64_t edges = std::uint64_t{3} * triangles_.size();
+        buffer<std::uint64_t> keys(backend_, edges);
+        buffer<std::uint32_t> order(backend_, edges);
+        backend_.for_each(edges, passes::hash_edges{mesh(), keys.data(), order.data()});
+        backend_.sort_by_key(keys, order, passes::edge_key_bits);
+        backend_.for_each(edges, passes::count_open_edges{mesh(), keys.data(), order.data(), edges, counts_.data()});
+    }
+
+    // The number of vertices through all draws and instances.
+    template <class Draw>
+    [[nodiscard]] static std::uint64_t num_vertices(std::span<const Draw> draws) {
+        std::uint64_t n = 0;
+        for (const auto& d : draws) n += d.mesh.positions.size() * d.mesh.copies.count;
+        return n;
+    }
+
+private:
+    template <class Draw>
+    [[nodiscard]] static std::uint64_t num_triangles(std::span<const Draw> draws) {
+        std::uint64_t n = 0;
+        for (const auto& d : draws) n += d.mesh.triangles.size() * d.mesh.copies.count;
+        return n;
+    }
+    // Before each draw. Held by the buffer's constructor alone.
+    template <class Draw>
+    [[nodiscard]] buffer<std::uint64_t> first_triangles(std::span<const Draw> draws) {
+        std::vector<std::uint64_t> first;
+        std::uint64_t n = 0;
+        for (const auto& d : draws) {
+            first.push_back(n);
+            n += d.mesh.triangles.size() * d.mesh.copies.count;
+        }
+        return {backend_, array_view<const std::uint64_t>(first.data(), first.size())};
+    }
+
+    Backend& backend_;
+    buffer<std::uint64_t> counts_;
+    buffer<snapped_position> positions_;
+    buffer<glm::uvec3> triangles_;
+    buffer<std::uint64_t> first_triangle_;
+    int fraction_;
+    glm::ivec3 extent_;
+};
+
+// The status of a call that has succeeded, or what failed.
+[[nodiscard]] inline status make_cell_status(const std::vector<std::uint64_t>& counts, const cell_options& options,
+                                             std::uint64_t triangles_in, std::uint64_t records) {
+    const auto of = [&](cell_count c) { return counts[index_of(c)]; };
+    status s;
+    if (of(cell_count::bad_index) != 0)
+        s = failure(status_code::index_out_of_range, stage::coarse_raster);
+    else if (of(cell_count::too_large) != 0)
+        s = failure(status_code::winding_too_large, stage::fine_raster);
+    s.counts.triangles_in = triangles_in;
+    if (!s.ok()) return s;
+    s.counts.triangles_nonfinite = of(cell_count::nonfinite);
+    s.counts.triangles_too_far = of(cell_count::too_far);
+    s.counts.triangles_outside = of(cell_count::outside);
+    s.counts.triangles_drawn = triangles_in - s.counts.triangles_dropped() - s.counts.triangles_outside;
+    s.counts.fragments = of(cell_count::fragments);
+    s.counts.fragments_discarded = of(cell_count::discarded);
+    s.counts.voxels = options.count_voxels ? of(cell_count::voxels) : 0;
+    s.cells.open_rows = of(cell_count::open_rows);
+    s.cells.open_edges = of(cell_count::open_edges);
+    s.cells.cut_voxels = of(cell_count::cut_voxels);
+    s.cells.below_zero = of(cell_count::below_zero);
+    s.cells.above_one = of(cell_count::above_one);
+    s.cells.cell_records = records;
+    uint128 volume = static_cast<uint128>(of(cell_count::volume_high)) << 64;
+    volume += static_cast<uint128>(of(cell_count::volume_middle)) << 32;
+    volume += of(cell_count::volume_low);
+    s.cells.volume_low = static_cast<std::uint64_t>(volume);
+    s.cells.volume_high = static_cast<std::int64_t>(volume >> 64);
+    return s;
+}
+
+// Implements voxelize_cells on any backend. Arguments are validated. Throws what the backend's buffers throw.
+template <class Backend, class Mesh, class VertexShader, class CellShader, class... Targets>
+[[nodiscard]] status run_cells(Backend& backend, std::span<const draw<Mesh, VertexShader, CellShader>> draws,
+                               const grid& g, const framebuffer_view<Targets...>& fb, const cell_options& options,
+                               std::uint64_t triangles_in) {
+    constexpr std::uint64_t most = std::uint64_t{1} << 32;
+    const auto fail = [&](status_code code) {
+        status s = failure(code, stage::coarse_raster);
+        s.counts.triangles_in = triangles_in;
+        return s;
+    };
+    // Vertices and edges are numbered in 32 bits.
+    if (cell_scene<Backend>::num_vertices(draws) >= most) return fail(status_code::out_of_memory);
+    const bool finds_edges = options.count_open_edges;
+    if (finds_edges && 3 * triangles_in >= most) return fail(status_code::out_of_memory);
+
+    cell_scene<Backend> scene(backend, draws, g, options.axis);
+    const glm::ivec3 extent = scene.extent();
+    const auto wide = [](int n) { return static_cast<std::uint64_t>(n); };
+    const passes::cell_keys keys_of{wide(extent.x) + 2, wide(extent.y),
+                                    options.bodies == bodies::call ? 1 : std::uint64_t{draws.size()}};
+    const std::uint64_t rows = wide(extent.y) * wide(extent.z);
+    const uint128 num_keys = static_cast<uint128>(rows) * keys_of.bodies * keys_of.slots;
+    if (num_keys >> 63 != 0) return fail(status_code::size_overflow);
+
+    using words = typename Backend::template buffer<std::uint32_t>;
+    using numbers = typename Backend::template buffer<std::uint64_t>;
+    numbers first_term(backend, triangles_in + 1);
+    std::uint64_t count = 0;
+    {
+        words num_terms(backend, triangles_in + 1);
+        backend.for_each(triangles_in + 1, passes::count_cells{scene.mesh(), num_terms.data(), scene.counts()});
+        count = backend.sum(num_terms, first_term);
+    }
+    if (finds_edges) scene.count_open_edges();
+    if (count >= most) return fail(status_code::out_of_memory);
+    numbers keys(backend, count);
+    words order(backend, count);
+    typename Backend::template buffer<cell_terms> terms(backend, count);
+    backend.for_each(triangles_in, passes::list_cells{scene.mesh(), keys_of, first_term.data(), keys.data(),
+                                                      order.data(), terms.data()});
+    backend.sort_by_key(keys, order, static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys))));
+    const passes::cell_list list{keys_of, keys.data(), order.data(), terms.data(), count};
+    constexpr std::uint64_t safe = std::uint64_t{1} << 19; // triangles whose covers cannot wrap
+    backend.for_each(rows * keys_of.bodies, passes::measure_rows{list, triangles_in >= safe, scene.counts()});
+    if (const status s = make_cell_status(scene.read_counts(), options, triangles_in, count); !s.ok()) return s;
+
+    if (const status begun = begin_fold(backend, fb); !begun.ok()) return begun;
+    std::vector<CellShader> shaders;
+    for (const auto& d : draws) shaders.push_back(d.fragment_shader);
+    const typename Backend::template buffer<CellShader> of_bodies(
+        backend, array_view<const CellShader>(shaders.data(), shaders.size()));
+    typename Backend::template buffer<passes::cell_cursor> cursors(backend,
+                                                                   keys_of.bodies == 1 ? 0 : rows * keys_of.bodies);
+    backend.for_each(rows, passes::shade_cells<CellShader, Targets...>{
+                               list, of_bodies.data(), keys_of.bodies == 1 ? nullptr : cursors.data(), fb, g.offset,
+                               options.axis, extent.x, scene.counts()});
+    return make_cell_status(scene.read_counts(), options, triangles_in, count);
+}
+
+} // namespace voxelpipe::core

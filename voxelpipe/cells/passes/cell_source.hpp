@@ -1,0 +1,184 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The triangles of a call's draws as one list in the backend's memory: vertex shaders, snapping, indices; and the
+// directed edges that no opposite edge cancels. Functors for Backend::for_each, the same on every backend.
+
+#include <voxelpipe/cells/cells.hpp>
+#include <voxelpipe/core/primitive.hpp>
+#include <voxelpipe/core/shared_counter.hpp>
+#include <voxelpipe/programs/elements.hpp>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace voxelpipe::core {
+
+// What the passes count, in 64-bit words. A volume comes in parts of 32, 32 and 64 bits, so that sums of 2^32 rows fit.
+enum class cell_count : std::uint8_t {
+    bad_index,
+    nonfinite,
+    too_far,
+    outside,
+    too_large,
+    open_rows,
+    open_edges,
+    cut_voxels,
+    below_zero,
+    above_one,
+    fragments,
+    discarded,
+    voxels,
+    volume_low,
+    volume_middle,
+    volume_high,
+    size
+};
+[[nodiscard]] VOXELPIPE_HD constexpr std::size_t index_of(cell_count c) { return static_cast<std::size_t>(c); }
+VOXELPIPE_HD inline void add_count(std::uint64_t* counts, cell_count c, std::uint64_t n) {
+    if (n != 0) add_shared(counts[index_of(c)], n);
+}
+
+namespace passes {
+
+// Triangles of all draws, whose positions have been turned so that rows run along x.
+struct cell_mesh {
+    const snapped_position* positions;
+    const glm::uvec3* triangles;         // of bad indices: all of them vertex 0, which counts
+    const std::uint64_t* first_triangle; // of each draw
+    std::uint32_t num_draws;
+    std::uint32_t num_triangles;
+    int fraction;
+    glm::ivec3 extent; // turned, too
+
+    [[nodiscard]] VOXELPIPE_HD snapped_position corner(std::uint64_t triangle, int i) const {
+        const glm::uvec3& t = triangles[triangle];
+        return positions[i == 0 ? t.x : i == 1 ? t.y : t.z];
+    }
+};
+
+// Shades and snaps the vertices of a draw.
+template <class Mesh, class VertexShader>
+struct snap_vertices {
+    Mesh mesh;
+    VertexShader shader;
+    std::uint32_t draw;
+    snap_transform snap;
+    int axis;
+    snapped_position* out;
+
+    VOXELPIPE_ANY_CALLABLE
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const std::uint64_t each = mesh.positions.size(), instance = i / each;
+        const auto v = fetch_vertex(mesh, static_cast<std::uint32_t>(i - instance * each), draw,
+                                    static_cast<std::uint32_t>(instance));
+        const auto result = shader(v);
+        const glm::vec3 at = vertex_result<std::remove_cvref_t<decltype(result)>>::widen(result).position;
+        const snapped_position p = core::snap(snap, at.x, at.y, at.z);
+        // A vertex that cannot be drawn has its mark in x.
+        if (axis == 0 || !is_drawable(p))
+            out[i] = p;
+        else
+            out[i] = axis == 1 ? snapped_position{p.y, p.z, p.x} : snapped_position{p.z, p.x, p.y};
+    }
+};
+
+// Numbers the vertices of a draw's triangles through all draws.
+struct join_triangles {
+    element_indices<3> in;
+    std::uint32_t first_vertex;
+    glm::uvec3* out;
+    std::uint64_t* counts;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const auto e = in.locate(static_cast<std::uint32_t>(i));
+        out[i] = glm::uvec3(0u, 0u, 0u);
+        if (e.ok)
+            out[i] = glm::uvec3(e.index[0] + first_vertex, e.index[1] + first_vertex, e.index[2] + first_vertex);
+        else
+            add_count(counts, cell_count::bad_index, 1);
+    }
+};
+
+// ---- open edges -----------------------------------------------------------------------------------------------------
+
+// An edge by its ends in lexicographic order. direction: 1, or -1 if the triangle runs the other way, 0 without length.
+struct snapped_edge {
+    snapped_position a, b;
+    int direction;
+};
+[[nodiscard]] VOXELPIPE_HD inline bool is_same_place(const snapped_position& a, const snapped_position& b) {
+    return a.x == b.x && a.y == b.y && a.z == b.z;
+}
+// Edge i % 3 of triangle i / 3.
+[[nodiscard]] VOXELPIPE_HD inline snapped_edge edge_of(const cell_mesh& m, std::uint64_t i) {
+    const std::uint64_t t = i / 3;
+    const int e = static_cast<int>(i % 3);
+    const snapped_position a = m.corner(t, e), b = m.corner(t, e == 2 ? 0 : e + 1), c = m.corner(t, e == 0 ? 2 : e - 1);
+    if (classify_positions(a, b, c) != triangle_class::drawn || is_same_place(a, b)) return {a, b, 0};
+    return is_before(a, b) ? snapped_edge{a, b, 1} : snapped_edge{b, a, -1};
+}
+
+inline constexpr int edge_key_bits = 39; // three passes of the CPU's sort; equal keys are compared exactly
+inline constexpr std::uint64_t no_edge = (std::uint64_t{1} << edge_key_bits) - 1;
+
+struct hash_edges {
+    cell_mesh mesh;
+    std::uint64_t* keys;
+    std::uint32_t* order;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const snapped_edge e = edge_of(mesh, i);
+        order[i] = static_cast<std::uint32_t>(i);
+        std::uint64_t h = 0;
+        const auto mix = [&](std::int64_t v) {
+            h = (h ^ static_cast<std::uint64_t>(v)) * 0x9e3779b97f4a7c15u;
+            h ^= h >> 29;
+        };
+        mix(e.a.x);
+        mix(e.a.y);
+        mix(e.a.z);
+        mix(e.b.x);
+        mix(e.b.y);
+        mix(e.b.z);
+        h = h * 0xbf58476d1ce4e5b9u >> (64 - edge_key_bits);
+        keys[i] = e.direction == 0 ? no_edge : h == no_edge ? 0 : h;
+    }
+};
+
+// Adds up the directions of equal edges, at the first of each run of equal keys.
+struct count_open_edges {
+    cell_mesh mesh;
+    const std::uint64_t* keys;
+    const std::uint32_t* order;
+    std::uint64_t count;
+    std::uint64_t* counts;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (keys[i] == no_edge || (i != 0 && keys[i] == keys[i - 1])) return;
+        std::uint64_t end = i + 1, open = 0;
+        while (end < count && keys[end] == keys[i]) ++end;
+        const auto equal = [](const snapped_edge& e, const snapped_edge& f) {
+            return is_same_place(e.a, f.a) && is_same_place(e.b, f.b);
+        };
+        const snapped_edge first = edge_of(mesh, order[i]);
+        for (std::uint64_t at = i; at < end; ++at) {
+            const snapped_edge e = edge_of(mesh, order[at]);
+            bool was_met = at != i && equal(e, first);
+            for (std::uint64_t before = i + 1; before < at && !was_met; ++before)
+                was_met = equal(e, edge_of(mesh, order[before]));
+            if (was_met) continue;
+            std::int64_t sum = 0;
+            for (std::uint64_t other = at; other < end; ++other) {
+                const snapped_edge f = edge_of(mesh, order[other]);
+                if (equal(e, f)) sum += f.direction;
+            }
+            open += static_cast<std::uint64_t>(sum < 0 ? -sum : sum);
+        }
+        add_count(counts, cell_count::open_edges, open);
+    }
+};
+
+} // namespace passes
+} // namespace voxelpipe::core
