@@ -43,7 +43,7 @@ public:
             using shader_type = std::remove_cvref_t<decltype(draws[d].vertex_shader)>;
             const std::uint64_t vertices = mesh.positions.size() * mesh.copies.count;
             const std::uint64_t triangles = mesh.triangles.size() * mesh.copies.count;
-            backend.for_each(vertices, passes::snap_vertices<mesh_type, shader_type>{
+            backend.for_each(vertices, passes::snap_vertices_of_cells<mesh_type, shader_type>{
                                            mesh, draws[d].vertex_shader, static_cast<std::uint32_t>(d), snap, axis,
                                            positions_.data() + first_vertex});
             backend.for_each(triangles, passes::join_triangles{elements_of<mesh_type>::indices(mesh),
@@ -186,7 +186,7 @@ template <class Backend, class Mesh, class VertexShader, class CellShader, class
     backend.for_each(triangles_in, passes::list_cells{scene.mesh(), keys_of, first_term.data(), keys.data(),
                                                       order.data(), terms.data()});
     backend.sort_by_key(keys, order, static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys))));
-    const passes::cell_list list{keys_of, keys.data(), order.data(), terms.data(), count};
+    const passes::record_list list{keys_of, keys.data(), order.data(), terms.data(), count};
     constexpr std::uint64_t safe = std::uint64_t{1} << 19; // triangles whose covers cannot wrap
     backend.for_each(rows * keys_of.bodies, passes::measure_rows{list, triangles_in >= safe, scene.counts()});
     if (const status s = make_cell_status(scene.read_counts(), options, triangles_in, count); !s.ok()) return s;

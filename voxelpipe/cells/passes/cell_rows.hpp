@@ -93,7 +93,7 @@ struct list_cells {
 };
 
 // The sorted terms.
-struct cell_list {
+struct record_list {
     cell_keys keys_of;
     const std::uint64_t* keys;
     const std::uint32_t* order;
@@ -125,7 +125,7 @@ struct cell_cursor {
         std::uint64_t cover, volume;
         bool has_any;
     };
-    [[nodiscard]] VOXELPIPE_HD slot_sums take(const cell_list& list) {
+    [[nodiscard]] VOXELPIPE_HD slot_sums take(const record_list& list) {
         slot_sums s{0, 0, false};
         for (; at < list.count && list.keys[at] == next_key; ++at) {
             const cell_terms& t = list.terms[list.order[at]];
@@ -140,7 +140,7 @@ struct cell_cursor {
 
 // Finds open rows, and rows whose sums might wrap. i: a row of a body.
 struct measure_rows {
-    cell_list list;
+    record_list list;
     bool checks_size;
     std::uint64_t* counts;
 
@@ -165,7 +165,7 @@ struct measure_rows {
 // Shades the voxels of a row, and blends them. i: a row of the grid, with all its bodies.
 template <class CellShader, class... Targets>
 struct shade_cells {
-    cell_list list;
+    record_list list;
     const CellShader* shaders; // one a body
     cell_cursor* cursors;      // a row's bodies; null with one body
     framebuffer_view<Targets...> fb;

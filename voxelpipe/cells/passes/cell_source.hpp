@@ -60,7 +60,7 @@ struct cell_mesh {
 
 // Shades and snaps the vertices of a draw.
 template <class Mesh, class VertexShader>
-struct snap_vertices {
+struct snap_vertices_of_cells {
     Mesh mesh;
     VertexShader shader;
     std::uint32_t draw;
