@@ -55,7 +55,7 @@ private:
     };
     [[nodiscard]] VOXELPIPE_HD static bool is_before(const place& a, const place& b) {
         const int order = compare(a.position, b.position);
-        return order != 0 ? order < 0 : a.triangle < b.triangle;
+        return order != 0 ? order < 0 : b.triangle > a.triangle; // nvcc takes a.triangle < for a template
     }
     [[nodiscard]] VOXELPIPE_HD static std::int64_t winding_of(std::uint64_t key) { return (key & 1) != 0 ? -1 : 1; }
 
@@ -77,7 +77,7 @@ private:
         edge_crossing c;
         c.t = round_position(chosen.position);
         set_normal(c, n, Axis, goes_out);
-        if (chosen.triangle < mesh.drawn)
+        if (mesh.drawn > chosen.triangle)
             c.source = mesh.primitives[chosen.triangle];
         else
             add_shared(counts[static_cast<int>(edge_count::on_cones)], 1);
