@@ -195,6 +195,8 @@ void describe_values(CLI::App& app, command_line& options, raw_options& raw) {
                "not there. ignore: nothing. Default: weight")
         ->option_text("RULE")
         ->group("Coverage and values");
+    app.add_flag("--clamp", options.voxelize.clamp, "Fractions below 0 become 0, those above 1 become 1")
+        ->group("Coverage and values");
 }
 
 void describe_solids(CLI::App& app, raw_options& raw) {
