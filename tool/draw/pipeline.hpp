@@ -42,7 +42,7 @@ public:
         : backend_{backend}, request_{request}, stats_{stats} {
         for (const target wanted : request.targets) wanted_[static_cast<std::size_t>(wanted)] = true;
         // A flood is compared with the surface, to tell whether anything is enclosed.
-        draws_surface_ = request.solid && request.solid->rule == solid_rule::exterior;
+        draws_surface_ = request.solid ? request.solid->rule == solid_rule::exterior : request.targets.empty();
         for (const target wanted : request.targets)
             draws_surface_ =
                 draws_surface_ ||
