@@ -120,6 +120,7 @@ tool_cases() {
     for target in occupancy count color color-max color-replace color-outer normal material triangle depth; do
         printf 'target.tool.%s model.glb out.npy -r 32 -t %s\n' "$target" "$target"
     done
+    printf 'cells.tool.fraction model.glb out.npz -r 32 -t fraction,occupancy --solid nonzero\n'
     for coverage in conservative thin crosshair diagonal; do
         printf 'coverage.tool.%s model.glb out.npz -r 40x28x33 --coverage %s -t occupancy,count\n' "$coverage" "$coverage"
     done

@@ -10,6 +10,7 @@ same bytes on every machine and any number of threads.
     surface = vp.voxelize(mesh, grid)        # bool, (nz, ny, nx)
     inside = vp.solid(mesh, grid)            # the same, filled
     field = vp.distance(mesh, grid)          # float32, negative inside
+    parts = vp.fractions(mesh, grid)         # float32, how much of each voxel is inside
     vp.save("surface.png", surface, grid)
 
 A mesh is a pair (vertices, triangles) of arrays, a mesh of trimesh, Open3D or PyVista, a path, a Model, or a list of those.
@@ -24,6 +25,7 @@ from ._bake import bake, sparse
 from ._core import Grid
 from ._distance import distance, distance_at
 from ._fit import fit
+from ._fractions import fractions
 from ._model import Material, Model, ModelWarning, Part, Texture, load_model
 from ._octree import Hits, Octree
 from ._remesh import extract, remesh
@@ -60,6 +62,7 @@ __all__ = [
     "extract",
     "fit",
     "formats",
+    "fractions",
     "fragments",
     "instances",
     "lines",

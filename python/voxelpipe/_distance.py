@@ -18,10 +18,10 @@ from ._surface import take_counts
 from ._types import Bodies, MeshLike, Repair, Sign, check_call, check_choice, check_grid, check_status, check_threads
 
 
-def _host_mesh(mesh: MeshLike) -> Mesh:
+def _host_mesh(mesh: MeshLike, what: str = "distances") -> Mesh:
     m = as_mesh(mesh)
     if isinstance(m, DeviceMesh):
-        raise TypeError("distances are computed on the CPU: copy the mesh to the host, as with .cpu() or .get()")
+        raise TypeError(f"{what} are computed on the CPU: copy the mesh to the host, as with .cpu() or .get()")
     return m
 
 

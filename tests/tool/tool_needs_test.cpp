@@ -129,6 +129,9 @@ std::vector<needs> all_needs() {
                 all.push_back({std::string(f.extension), wanted, "--dense", is_bits ? 600 : dense_resolution});
             all.push_back({std::string(f.extension), wanted, "--sparse", is_bits ? 1000 : sparse_resolution});
         }
+#ifdef VOXELPIPE_ALL_NEEDS
+    all.push_back({".npy", "fraction", "--dense", dense_resolution});
+#endif
     return all;
 }
 

@@ -57,6 +57,7 @@ std::set<std::string> all_options() {
             "--coverage RULE",
             "--depth-axis AXIS",
             "--alpha RULE",
+            "--clamp",
             "--backend NAME",
             "--strategy NAME",
             "--devices N|all",

@@ -1,14 +1,15 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Solids in the tool's pipeline: their bits, slab by slab, and the values of the voxels inside. Part of pipeline.hpp:
-// a file that instantiates the pipeline includes it.
+// Solids in the tool's pipeline: their bits, slab by slab, and the values of the voxels inside; and fractions. Part of
+// pipeline.hpp: a file that instantiates the pipeline includes it.
 
 #include "distance/distance_shader.hpp"
 #include "model/memory.hpp"
 #include "model/placement.hpp"
 #include "pipeline.hpp"
 
+#include <voxelpipe/cells/cells.hpp>
 #include <voxelpipe/solid/diagnose_repair.hpp>
 
 #include <algorithm>
@@ -184,6 +185,47 @@ void pipeline<Backend>::examine_solid_bits(const voxelpipe::grid& whole) {
                          status.message() + "): take a grid that holds the model, or --solid nonzero");
     counts.is_examined = status.ok() || status.code == vp::status_code::crop_without_whole;
     if (status.ok()) counts.flood = status.solid.flood;
+}
+
+template <class Backend>
+void pipeline<Backend>::draw_fractions(volume& result) {
+    // What the passes before it have worked in is not needed any more.
+    surface_framebuffer_.reset();
+    bits_framebuffer_.reset();
+    solid_framebuffer_.reset();
+    outer_framebuffer_.reset();
+    report_from(num_passes() - 1, 0, 1);
+    using draw = vp::draw<vp::mesh_view<>, instanced_vertex_shader, vp::fraction>;
+    std::vector<draw> draws;
+    for (const auto& d : uploaded_->bits_draws()) draws.push_back({d.mesh, d.vertex_shader, {}});
+    const glm::ivec3 extent = request_.grid.extent;
+    float* const values = channel_at<float>(result, info_of(target::fraction).name, 0);
+    const auto view = vp::framebuffer_view<vp::target<float, vp::blend::replace>>::on(extent, values);
+    vp::status status;
+    {
+        const stage_timer timer{*this, "fractions"};
+        status = vp::voxelize_cells(backend_, draws, uploaded_->relative_grid(), view);
+        check(status, request_);
+        if (request_.clamp)
+            memory_access<Backend>::read(
+                backend_, values, static_cast<std::size_t>(result.num_voxels()),
+                [values](std::size_t i) { return std::clamp(values[i], 0.0F, 1.0F); }, thread_count(request_.threads));
+    }
+    if (!draws_surface_ && !request_.solid) { // otherwise these are counts of what was drawn before
+        stats_.triangles_dropped = status.counts.triangles_dropped();
+        add_counts(status);
+        stats_.slabs = 1;
+    }
+    stats_.fractions = fraction_counts{status.cells.volume(),
+                                       status.cells.cut_voxels,
+                                       status.cells.below_zero,
+                                       status.cells.above_one,
+                                       static_cast<std::uint64_t>(extent.y) * static_cast<std::uint64_t>(extent.z),
+                                       status.cells.open_rows,
+                                       status.cells.open_edges};
+    for (std::string& warning : fraction_warnings(*stats_.fractions, request_.clamp))
+        stats_.warnings.push_back(std::move(warning));
+    report_(1.0);
 }
 
 template <class Backend>

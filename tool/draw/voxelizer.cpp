@@ -40,11 +40,28 @@ struct scene_bytes {
 
 scene_bytes bytes_of(const scene& model, const voxelize_request& request) {
     bool shaded = false;
-    for (const target id : request.targets) shaded = shaded || (id != target::occupancy && id != target::count);
+    for (const target id : request.targets)
+        shaded = shaded || (id != target::occupancy && id != target::count && id != target::fraction);
     for (const material& m : model.materials) shaded = shaded || m.alpha == alpha_mode::mask;
     const auto vertices = static_cast<double>(model.vertex_count());
     return {vertices * sizeof(vp::core::snapped_position), shaded ? vertices * sizeof(surface_varyings) : 0,
             static_cast<double>(model.triangle_count()) * 24, static_cast<double>(model.line_count()) * 128};
+}
+
+// Bytes of drawing fractions beside the result, after the other targets: snapped vertices and triangles; and the edges
+// that are sorted, or the pairs of a triangle and a voxel that meet, of a surface somewhat larger than that of the
+// grid.
+double fraction_bytes(const voxelize_request& request, double vertices, double triangles) {
+    if (!request.wants(target::fraction)) return 0;
+    const glm::dvec3 n(request.grid.extent);
+    constexpr double triangle_bytes = 36, edges_bytes = 72, pair_bytes = 56;
+    const double pairs = 2 * triangles + 2.5 * (n.x * n.y + n.y * n.z + n.z * n.x);
+    return sizeof(vp::core::snapped_position) * vertices + triangle_bytes * triangles +
+           std::max(edges_bytes * triangles, pair_bytes * pairs);
+}
+double fraction_bytes(const scene& model, const voxelize_request& request) {
+    return fraction_bytes(request, static_cast<double>(model.vertex_count()),
+                          static_cast<double>(model.triangle_count()));
 }
 
 // Bytes of the result, of its largest channel once more while a ring is put around it, and of a solid's bits.
@@ -65,10 +82,11 @@ result_bytes result_of(const voxelize_request& request) {
     return bytes;
 }
 
-// Bytes of a voxel while it is drawn.
+// Bytes of a voxel while it is drawn. Fractions are drawn into the result.
 double drawn_bytes(std::span<const target> targets) {
     double bytes = 0;
     for (const target id : targets) {
+        if (id == target::fraction) continue;
         const double value = static_cast<double>(size_of(info_of(id).type)) * info_of(id).components;
         bytes += id == target::color ? 20 : id == target::color_outer ? 8 : std::max(value, 0.125);
     }
@@ -99,7 +117,8 @@ volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats)
     const int threads = thread_count(request.threads);
     const scene_bytes parts = bytes_of(model, request);
     const double least = parts.vertices + volume_bytes(request);
-    const double likely = least + parts.varyings + parts.triangles + parts.lines;
+    const double likely = std::max(least + parts.varyings + parts.triangles + parts.lines,
+                                   volume_bytes(request) + fraction_bytes(model, request));
     require_vertices(model, request, volume_bytes(request));
     const auto room = static_cast<double>(memory::room());
     const double likely_in_all = static_cast<double>(memory::limit()) - room + likely;
@@ -183,25 +202,29 @@ volume with_ring(volume inside, const voxelize_request& request) {
 
 namespace {
 
-// Bytes beyond those of the model's vertices and triangles: `parts` are those.
-double dense_need_beside(const voxelize_request& request, double parts) {
+// Bytes beyond those of the model's vertices and triangles: `parts` are those, `fractions` with those of fractions.
+double dense_need_beside(const voxelize_request& request, double parts, double fractions) {
     const auto [volume, ring, bits] = result_of(request);
     // A slab of one layer, and each thread's tile with its sums.
     constexpr double least_work = 1 << 20, thread_bytes = 1 << 20, tile_voxels = 32768, sums = 2.5;
     const double voxel = drawn_bytes(request.targets);
     const double threads = thread_count(request.threads) * (thread_bytes + tile_voxels * (sums * voxel + 8));
     const double layer = voxel * request.grid.extent.x * request.grid.extent.y;
-    return volume + std::max({ring, bits + parts + least_work + layer + threads, written_bytes(request)});
+    return volume +
+           std::max({ring, bits + parts + least_work + layer + threads, bits + fractions, written_bytes(request)});
 }
 
 } // namespace
 
 double dense_need(const scene& model, const voxelize_request& request) {
     const scene_bytes parts = bytes_of(model, request);
-    return dense_need_beside(request, parts.vertices + parts.varyings + parts.triangles + parts.lines);
+    return dense_need_beside(request, parts.vertices + parts.varyings + parts.triangles + parts.lines,
+                             fraction_bytes(model, request));
 }
 
-double dense_need(const voxelize_request& request) { return dense_need_beside(request, 0); }
+double dense_need(const voxelize_request& request) {
+    return dense_need_beside(request, 0, fraction_bytes(request, 0, 0));
+}
 
 void require_vertices(const scene& model, const voxelize_request& request, double result) {
     const scene_bytes parts = bytes_of(model, request);
@@ -220,8 +243,11 @@ volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_st
         voxelize_request inside = request;
         inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
         if (inside.solid) inside.solid->is_whole = true;
-        const bool only_cpu = request.solid && request.solid->fill == solid_fill::nearest;
-        if (only_cpu) stats.no_cuda = "--fill nearest is drawn on the CPU alone";
+        const bool only_cpu =
+            request.wants(target::fraction) || (request.solid && request.solid->fill == solid_fill::nearest);
+        if (only_cpu)
+            stats.no_cuda = std::string(request.wants(target::fraction) ? "--target fraction" : "--fill nearest") +
+                            " is drawn on the CPU alone";
         if (only_cpu && request.backend == backend_choice::cuda)
             throw backend_error("--backend cuda: " + stats.no_cuda + "; use --backend cpu");
         if (only_cpu && (request.strategy != voxelpipe::strategy::automatic || request.devices != 1))

@@ -53,6 +53,7 @@ struct voxelize_request {
     std::optional<remesh_request> remesh;           // instead of all three: no volume is drawn
     std::vector<target> targets{target::occupancy}; // channels of the volume, in this order, none twice
     int depth_axis = 2;                             // 0 x, 1 y, 2 z
+    bool clamp = false;                             // fractions to 0..1
     blend_alpha alpha = blend_alpha::weight;
     backend_choice backend = backend_choice::automatic;
     voxelpipe::strategy strategy = voxelpipe::strategy::automatic; // on a GPU
@@ -87,6 +88,17 @@ struct voxelize_request {
     return made;
 }
 
+// What was found when fractions were drawn.
+struct fraction_counts {
+    double volume = 0;            // sum of the fractions of all voxels, before they are clamped
+    std::uint64_t cut_voxels = 0; // that a triangle's inside reaches
+    std::uint64_t below_zero = 0; // voxels with a fraction below -2^-24
+    std::uint64_t above_one = 0;  // above 1 + 2^-24
+    std::uint64_t rows = 0;       // rows of voxels along x
+    std::uint64_t open_rows = 0;  // rows whose triangles do not balance
+    std::uint64_t open_edges = 0; // edges of the snapped model that no opposite edge cancels
+};
+
 struct voxelize_stats {
     std::string backend;                 // "cpu" or "cuda"
     std::string device;                  // the GPU's name
@@ -109,7 +121,8 @@ struct voxelize_stats {
     std::uint64_t fragments_discarded = 0; // by an alpha mask
     std::uint64_t voxels = 0;              // with at least one fragment; of a solid where that is asked for
     std::optional<solid_counts> solid;     // where that is asked for
-    std::uint64_t normals_cancelled = 0;   // voxels whose normals cancel out, or that have none; with --target normal
+    std::optional<fraction_counts> fractions; // with --target fraction
+    std::uint64_t normals_cancelled = 0; // voxels whose normals cancel out, or that have none; with --target normal
     std::vector<std::pair<std::string, double>> milliseconds; // stage -> time, in pipeline order
     std::vector<std::string> warnings;                        // one line each
 };
@@ -127,6 +140,9 @@ struct backend_error : std::runtime_error {
 // The reason why no voxel is covered, one line; for stats that count none. low, high: the model's bounds.
 [[nodiscard]] std::string why_empty(const voxelize_stats& stats, const voxelize_request& request, const glm::dvec3& low,
                                     const glm::dvec3& high);
+
+// Lines on fractions that are no volume inside: of an open model, and of parts that overlap or are inside out.
+[[nodiscard]] std::vector<std::string> fraction_warnings(const fraction_counts& counts, bool clamp);
 
 // One line on normals that cancel; empty where none do.
 [[nodiscard]] std::string cancelled_warning(const voxelize_stats& stats);

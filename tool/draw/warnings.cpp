@@ -37,6 +37,19 @@ std::string why_empty(const voxelize_stats& stats, const voxelize_request& reque
            ": move or enlarge it with --origin and --extent, or take what encloses it with --solid nonzero";
 }
 
+std::vector<std::string> fraction_warnings(const fraction_counts& counts, bool clamp) {
+    std::vector<std::string> warnings;
+    if (counts.open_rows != 0)
+        warnings.push_back("the model is not closed: " + std::to_string(counts.open_rows) + " of " +
+                           std::to_string(counts.rows) + " rows of voxels along x do not balance, and the fractions " +
+                           "behind a hole are in doubt (" + std::to_string(counts.open_edges) + " open edges)");
+    if (counts.below_zero + counts.above_one != 0 && !clamp)
+        warnings.push_back("the fractions of " + std::to_string(counts.below_zero) +
+                           " voxels are below 0 and those of " + std::to_string(counts.above_one) +
+                           " above 1: parts overlap or are inside out; --clamp keeps 0 to 1");
+    return warnings;
+}
+
 std::string cancelled_warning(const voxelize_stats& stats) {
     if (stats.normals_cancelled == 0) return "";
     return "the normals of " + std::to_string(stats.normals_cancelled) + " of " + std::to_string(stats.voxels) +

@@ -27,7 +27,8 @@ enum class target : std::uint8_t {
     triangle,
     depth,
     distance,
-    nearest
+    nearest,
+    fraction
 };
 
 struct target_info {
@@ -56,11 +57,13 @@ inline constexpr std::array all_targets{
     target_info{target::distance, "distance", scalar::f32, 1, "what --distance gives, see DISTANCES"},
     target_info{target::nearest, "nearest", scalar::i64, 1,
                 "with --distance: number of the nearest triangle; beyond the band: -1", UINT32_MAX},
+    target_info{target::fraction, "fraction", scalar::f32, 1,
+                "how much of the voxel is inside, 0 to 1 if no parts overlap; see FRACTIONS"},
 };
 
 inline constexpr std::size_t target_count = all_targets.size();
-// Those of surfaces and solids; the two others go with --distance.
-inline constexpr std::span target_table = std::span(all_targets).first<target_count - 2>();
+// Those of surfaces and solids, dense and sparse. Two others go with --distance, and fractions are dense alone.
+inline constexpr std::span target_table = std::span(all_targets).first<target_count - 3>();
 
 [[nodiscard]] constexpr const target_info& info_of(target id) { return all_targets[static_cast<std::size_t>(id)]; }
 

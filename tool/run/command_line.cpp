@@ -134,6 +134,7 @@ command_line parse_command_line(int argc, const char* const* argv) {
     understand_remesh(options, raw);
     understand_grid(options, raw);
     understand_outputs(options, raw);
+    understand_fractions(options, raw);
     understand_picture(options, raw);
     if (options.voxelize.backend == backend_choice::cpu && options.voxelize.strategy != voxelpipe::strategy::automatic)
         throw usage_error("--strategy says how a GPU draws; it does not go with --backend cpu");

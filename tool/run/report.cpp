@@ -127,6 +127,11 @@ void print_text(std::ostream& stream, const run_report& report) {
     if (report.stats.solid && report.stats.solid->holes != 0)
         line("holes") << report.stats.solid->closed_holes << " of " << report.stats.solid->holes << " closed, of "
                       << report.stats.solid->hole_edges << " edges in all\n";
+    if (const auto& counts = report.stats.fractions; counts)
+        line("fractions") << "volume of " << shortest(counts->volume) << " voxels, " << counts->cut_voxels << " cut, "
+                          << counts->below_zero << " below 0, " << counts->above_one << " above 1, "
+                          << counts->open_rows << " of " << counts->rows << " rows open, " << counts->open_edges
+                          << " open edges\n";
     if (report.stats.normals_cancelled != 0) line("normals cancelled") << report.stats.normals_cancelled << '\n';
     stream << std::fixed << std::setprecision(1);
     for (const auto& [stage, time] : report.stats.milliseconds)
@@ -195,6 +200,14 @@ void print_json(std::ostream& stream, const run_report& report) {
                           {"cone_crossings", c.cone_crossings}};
         if (report.stats.solid) root["remesh"]["open_rows"] = report.stats.solid->open_rows;
     }
+    if (const auto& counts = report.stats.fractions; counts)
+        root["fractions"] = {{"volume", counts->volume},
+                             {"cut_voxels", counts->cut_voxels},
+                             {"below_zero", counts->below_zero},
+                             {"above_one", counts->above_one},
+                             {"rows", counts->rows},
+                             {"open_rows", counts->open_rows},
+                             {"open_edges", counts->open_edges}};
     root["targets"] = json::array();
     for (const target id : report.request.targets)
         if (!report.request.remesh) root["targets"].push_back(info_of(id).name);

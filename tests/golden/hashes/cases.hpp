@@ -34,6 +34,8 @@ void add_coverages(case_table<Backend>& cases);
 template <class Backend>
 void add_solids(case_table<Backend>& cases);
 template <class Backend>
+void add_cells(case_table<Backend>& cases);
+template <class Backend>
 void add_targets(case_table<Backend>& cases);
 template <class Backend>
 void add_integer_targets(case_table<Backend>& cases);
@@ -53,6 +55,7 @@ case_table<Backend> all_cases() {
     case_table<Backend> cases;
     add_coverages(cases);
     add_solids(cases);
+    add_cells(cases);
     add_targets(cases);
     add_integer_targets(cases);
     add_lists(cases);

@@ -4,6 +4,7 @@
 // golden_hashes on a GPU: the same options, names and hashes. --left-out prints the names that it has not, each with
 // the reason. Ends with 77 where there is no device and a case is to run.
 
+#include "cells.hpp"
 #include "coverages.hpp"
 #include "levels.hpp"
 #include "lists.hpp"

@@ -277,6 +277,7 @@ private:
                 break;
             case target::distance: // those of --distance alone, which draws no bricks
             case target::nearest:
+            case target::fraction: // of dense grids alone
                 break;
             }
         }

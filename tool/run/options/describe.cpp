@@ -195,6 +195,8 @@ void describe_values(CLI::App& app, command_line& options, raw_options& raw) {
                "not there. ignore: nothing. Default: weight")
         ->option_text("RULE")
         ->group("Coverage and values");
+    app.add_flag("--clamp", options.voxelize.clamp, "Fractions below 0 become 0, those above 1 become 1")
+        ->group("Coverage and values");
 }
 
 void describe_solids(CLI::App& app, raw_options& raw) {
@@ -265,6 +267,7 @@ void describe_remesh(CLI::App& app, raw_options& raw) {
         {{"corner", voxelpipe::place::corner}, {"mean", voxelpipe::place::mean}, {"sharp", voxelpipe::place::sharp}},
         "Where its vertices lie: where the model's planes meet (sharp), which keeps creases and corners, at the "
         "mean of its crossings, or at the corners of voxels. Default: sharp")
+        ->option_text("WHERE")
         ->group("Remeshing");
     app.add_flag("--quads", raw.quads, "Quads, where the format has them: .obj, .ply and .npz")->group("Remeshing");
     app.add_flag("--report", raw.report,

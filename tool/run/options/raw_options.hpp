@@ -54,6 +54,7 @@ void understand_distance(command_line& options, const raw_options& raw);
 void understand_remesh(command_line& options, const raw_options& raw);
 void understand_grid(command_line& options, const raw_options& raw);
 void understand_outputs(command_line& options, const raw_options& raw);
+void understand_fractions(command_line& options, const raw_options& raw);
 void understand_picture(command_line& options, const raw_options& raw);
 
 } // namespace voxelize

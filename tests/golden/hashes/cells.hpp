@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Cut cells: fractions, apertures and sums of closed, open and broken meshes, by each axis, by draws and in a crop.
+
+#include "cases.hpp"
+
+#include <utility>
+
+namespace golden {
+
+struct parts_of_cell {
+    VOXELPIPE_HD auto operator()(const vp::cell_fragment& f) const {
+        return vp::outputs(f.fraction, f.units, f.aperture, f.next_aperture,
+                           mixed(f.draw, f.is_cut ? 1u : 0u) ^ static_cast<std::uint32_t>(f.voxel.y));
+    }
+};
+
+template <class Backend>
+void cell_values(Backend& backend, digest& d, const std::vector<mesh_data>& bodies, const vp::grid& grid,
+                 const vp::cell_options& options) {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, parts_of_cell>;
+    using number = vp::target<std::int64_t, vp::blend::add>;
+    std::vector<vp::mesh<Backend>> meshes;
+    for (const mesh_data& m : bodies) meshes.push_back(upload(backend, m));
+    std::vector<draw_type> draws;
+    for (const auto& m : meshes) draws.push_back({m.view(), {}, {}});
+    vp::framebuffer<Backend, vp::target<float, vp::blend::replace>, number, number, number,
+                    vp::target<std::uint32_t, vp::blend::bit_xor>>
+        fb{backend, grid.extent};
+    const vp::status s = vp::voxelize_cells(backend, draws, grid, fb, options);
+    add_counts(d, s);
+    const vp::cell_counters& c = s.cells;
+    d.add(std::vector<std::uint64_t>{c.volume_low, static_cast<std::uint64_t>(c.volume_high), c.cut_voxels,
+                                     c.below_zero, c.above_one, c.open_rows, c.open_edges, c.cell_records});
+    vp::core::for_each_index<5>([&]<std::size_t I>() { d.add(vp::get<I>(fb).to_host(backend)); });
+}
+
+template <class Backend>
+void add_cells(case_table<Backend>& cases) {
+    const auto add = [&](const std::string& name, const std::vector<mesh_data>& bodies, const vp::grid& grid,
+                         const vp::cell_options& options) {
+        cases.push_back(
+            {"cells." + name, [=](Backend& backend, digest& d) { cell_values(backend, d, bodies, grid, options); }});
+    };
+    const auto of = [](const char* name) { return std::vector<mesh_data>{hashed_mesh(name)}; };
+    for (const char* const mesh : {"torus", "soup", "open"}) add(mesh, of(mesh), odd_grid(), {});
+    for (const int axis : {1, 2}) {
+        vp::cell_options o;
+        o.axis = axis;
+        add(std::string("axis.") + "xyz"[axis] + ".soup", of("soup"), odd_grid(), o);
+    }
+    vp::cell_options by_draws;
+    by_draws.bodies = vp::bodies::draw;
+    add("draws.shells", shells(), odd_grid(), by_draws);
+    add("crop.shells", of("shells"), crop_of_odd_grid(), {});
+}
+
+} // namespace golden

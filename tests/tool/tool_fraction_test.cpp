@@ -1,0 +1,267 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+// --target fraction: the library's values in files, beside other targets, clamped, of open models, and what is refused.
+#include "tool_test.hpp"
+
+#include <cpu_ref/backend.hpp>
+#include <voxelpipe/voxelpipe.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+
+using namespace tool_test;
+
+namespace {
+
+namespace vp = voxelpipe;
+
+struct shape {
+    std::vector<glm::vec3> positions;
+    std::vector<glm::uvec3> triangles;
+};
+
+// The box from LOW to HIGH, its faces outward; its corners are moved along x by SHEAR times their y.
+shape box(const glm::vec3& low, const glm::vec3& high, float shear = 0) {
+    shape made;
+    for (int corner = 0; corner < 8; ++corner) {
+        glm::vec3 p;
+        for (int axis = 0; axis < 3; ++axis) p[axis] = (corner >> axis & 1) != 0 ? high[axis] : low[axis];
+        p.x += shear * p.y;
+        made.positions.push_back(p);
+    }
+    made.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                      {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+    return made;
+}
+
+void add(builder& file, const shape& s) {
+    std::vector<float> positions;
+    for (const glm::vec3& p : s.positions) positions.insert(positions.end(), {p.x, p.y, p.z});
+    std::vector<std::uint8_t> indices;
+    for (const glm::uvec3& t : s.triangles)
+        for (int i = 0; i < 3; ++i) indices.push_back(static_cast<std::uint8_t>(t[i]));
+    const int index_accessor = file.accessor(indices, "SCALAR");
+    json& primitive = file.mesh({{"POSITION", file.accessor(positions, "VEC3")}});
+    primitive["indices"] = index_accessor;
+}
+
+vp::grid grid_of_16() {
+    vp::grid grid;
+    grid.origin = glm::dvec3(-4);
+    grid.voxel_size = glm::dvec3(0.5);
+    grid.extent = glm::ivec3(16);
+    return grid;
+}
+
+// Runs `voxelize m.glb -o OUTPUT` with ARGUMENTS in that grid.
+outcome draw(const scratch_folder& folder, const builder& file, const std::string& output,
+             const std::vector<std::string>& arguments) {
+    file.write_glb(folder / "m.glb");
+    std::vector<std::string> all{folder / "m.glb", "-o",      folder / output, "--origin", "-4,-4,-4", "-s", "0.5",
+                                 "--extent",       "16,16,16"};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    return run(folder, all);
+}
+
+// What the library gives for these parts as one mesh.
+std::vector<float> library_fractions(const std::vector<shape>& parts, const vp::grid& grid) {
+    shape all;
+    for (const shape& part : parts) {
+        const auto first = static_cast<std::uint32_t>(all.positions.size());
+        all.positions.insert(all.positions.end(), part.positions.begin(), part.positions.end());
+        for (const glm::uvec3& t : part.triangles) all.triangles.push_back(t + first);
+    }
+    vp::cpu_backend backend(1);
+    const vp::mesh<vp::cpu_backend> mesh(backend, all.positions, all.triangles);
+    vp::framebuffer<vp::cpu_backend, vp::target<float, vp::blend::replace>> fb(backend, grid.extent);
+    const vp::status status = vp::voxelize_cells(backend, mesh, grid, vp::passthrough{}, vp::fraction{}, fb);
+    EXPECT_TRUE(status.ok()) << status.message();
+    return vp::get<0>(fb).to_host(backend);
+}
+
+void expect_same(const std::vector<float>& expected, const array& found) {
+    ASSERT_EQ(expected.size(), found.voxels());
+    for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_EQ(expected[i], found.at<float>(i)) << i;
+}
+
+const shape tilted = box({-2.1F, -1.3F, -1.7F}, {1.2F, 2.3F, 1.1F}, 0.37F);
+
+TEST(Fraction, NpyHasTheBytesOfTheLibrary) {
+    const scratch_folder folder;
+    builder file;
+    add(file, tilted);
+    for (const char* const threads : {"1", "3"}) {
+        const outcome result = draw(folder, file, "o.npy", {"-t", "fraction", "-j", threads});
+        ASSERT_EQ(0, result.code) << result.err;
+        const array found = read_npy(folder / "o.npy");
+        EXPECT_EQ("<f4", found.type);
+        ASSERT_EQ((std::vector<std::size_t>{16, 16, 16}), found.shape);
+        expect_same(library_fractions({tilted}, grid_of_16()), found);
+    }
+}
+
+TEST(Fraction, OfABoxIsTheProductOfItsOverlaps) {
+    const scratch_folder folder;
+    builder file;
+    const glm::dvec3 low(-2.125, -1.75, -3), high(1.625, 2.0625, 0.25);
+    add(file, box(low, high));
+    const outcome result = draw(folder, file, "o.npy", {"-t", "fraction", "--stats", "json"});
+    ASSERT_EQ(0, result.code) << result.err;
+    EXPECT_EQ(std::string::npos, result.err.find("warning")) << result.err;
+    const array found = read_npy(folder / "o.npy");
+    std::size_t i = 0, covered = 0;
+    for (int z = 0; z < 16; ++z)
+        for (int y = 0; y < 16; ++y)
+            for (int x = 0; x < 16; ++x) {
+                const glm::dvec3 first = -4.0 + 0.5 * glm::dvec3(x, y, z);
+                const glm::dvec3 part = glm::max(glm::min(first + 0.5, high) - glm::max(first, low), 0.0) / 0.5;
+                covered += part.x * part.y * part.z > 0 ? 1 : 0;
+                ASSERT_EQ(static_cast<float>(part.x * part.y * part.z), found.at<float>(i++))
+                    << x << ' ' << y << ' ' << z;
+            }
+    const json stats = json::parse(result.out), fractions = stats["fractions"];
+    const glm::dvec3 size = (high - low) / 0.5;
+    EXPECT_EQ(size.x * size.y * size.z, fractions["volume"].get<double>());
+    EXPECT_EQ(256, fractions["rows"].get<int>());
+    for (const char* const name : {"open_rows", "open_edges", "below_zero", "above_one"})
+        EXPECT_EQ(0, fractions[name].get<int>()) << name;
+    EXPECT_LE(covered, stats["voxels"].get<std::size_t>());
+    EXPECT_EQ("cpu", stats["backend"].get<std::string>());
+}
+
+TEST(Fraction, OtherTargetsBesideItAreAsWithoutIt) {
+    const scratch_folder folder;
+    builder file;
+    add(file, tilted);
+    const std::vector<float> expected = library_fractions({tilted}, grid_of_16());
+    const std::vector<std::vector<std::string>> ways{{}, {"--solid", "nonzero"}};
+    for (const std::vector<std::string>& way : ways) {
+        std::vector<std::string> alone = way, both = way;
+        alone.insert(alone.end(), {"-t", "occupancy,normal"});
+        both.insert(both.end(), {"-t", "occupancy,fraction,normal", "--work-memory", "1"});
+        ASSERT_EQ(0, draw(folder, file, "a.npy", alone).code);
+        const outcome result = draw(folder, file, "b.npy", both);
+        ASSERT_EQ(0, result.code) << result.err;
+        for (const std::string name : {".occupancy.npy", ".normal.npy"})
+            EXPECT_EQ(read_file(folder / ("a" + name)), read_file(folder / ("b" + name))) << name;
+        expect_same(expected, read_npy(folder / "b.fraction.npy"));
+    }
+}
+
+TEST(Fraction, PaddingIsEmptyAroundIt) {
+    const scratch_folder folder;
+    builder file;
+    add(file, tilted);
+    file.write_glb(folder / "m.glb");
+    const auto fractions = [&](const std::vector<std::string>& grid) {
+        std::vector<std::string> arguments{folder / "m.glb", "-o", folder / "o.npy", "-t", "fraction"};
+        arguments.insert(arguments.end(), grid.begin(), grid.end());
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+        return read_npy(folder / "o.npy");
+    };
+    const array plain = fractions({"-r", "10"}), padded = fractions({"-r", "16", "--padding", "3"});
+    for (std::size_t axis = 0; axis < 3; ++axis) ASSERT_EQ(plain.shape[axis] + 6, padded.shape[axis]);
+    const std::size_t ny = plain.shape[1], nx = plain.shape[2];
+    std::size_t i = 0, whole = 0;
+    for (std::size_t z = 0; z < padded.shape[0]; ++z)
+        for (std::size_t y = 0; y < padded.shape[1]; ++y)
+            for (std::size_t x = 0; x < padded.shape[2]; ++x) {
+                const bool inside = z - 3 < plain.shape[0] && y - 3 < ny && x - 3 < nx; // of unsigned numbers
+                const float expected = inside ? plain.at<float>(((z - 3) * ny + y - 3) * nx + x - 3) : 0.0F;
+                whole += expected == 1.0F ? 1 : 0;
+                ASSERT_EQ(expected, padded.at<float>(i++)) << x << ' ' << y << ' ' << z;
+            }
+    EXPECT_GT(whole, 100U);
+}
+
+TEST(Fraction, OverlapsAddUpAndClampKeepsOne) {
+    const scratch_folder folder;
+    builder file;
+    shape inverted = box({2, 2, 2}, {3, 3, 3});
+    for (glm::uvec3& t : inverted.triangles) std::swap(t.y, t.z);
+    const std::vector<shape> parts{tilted, box({-1, -1, -1}, {1, 3, 1}), inverted};
+    for (const shape& part : parts) add(file, part);
+    const outcome plain = draw(folder, file, "plain.npy", {"-t", "fraction"});
+    ASSERT_EQ(0, plain.code) << plain.err;
+    EXPECT_NE(std::string::npos, plain.err.find("--clamp keeps 0 to 1")) << plain.err;
+    std::vector<float> expected = library_fractions(parts, grid_of_16());
+    EXPECT_EQ(2, *std::max_element(expected.begin(), expected.end()));
+    EXPECT_EQ(-1, *std::min_element(expected.begin(), expected.end()));
+    expect_same(expected, read_npy(folder / "plain.npy"));
+    const outcome clamped = draw(folder, file, "clamped.npy", {"-t", "fraction", "--clamp"});
+    ASSERT_EQ(0, clamped.code) << clamped.err;
+    EXPECT_EQ(std::string::npos, clamped.err.find("--clamp")) << clamped.err;
+    for (float& value : expected) value = std::clamp(value, 0.0F, 1.0F);
+    expect_same(expected, read_npy(folder / "clamped.npy"));
+}
+
+TEST(Fraction, OpenModelsAndLinesAreNamed) {
+    const scratch_folder folder;
+    builder file;
+    shape open = tilted;
+    open.triangles.pop_back();
+    add(file, open);
+    file.mesh({{"POSITION", file.accessor(std::vector<float>{0, 0, 0, 1, 1, 1}, "VEC3")}})["mode"] = 1;
+    const outcome result = draw(folder, file, "o.npy", {"-t", "fraction"});
+    ASSERT_EQ(0, result.code) << result.err;
+    EXPECT_NE(std::string::npos, result.err.find("the model is not closed: ")) << result.err;
+    EXPECT_NE(std::string::npos, result.err.find("(3 open edges)")) << result.err;
+    EXPECT_NE(std::string::npos, result.err.find("1 line(s) and point(s) enclose nothing")) << result.err;
+    expect_same(library_fractions({open}, grid_of_16()), read_npy(folder / "o.npy"));
+
+    builder lines;
+    lines.mesh({{"POSITION", lines.accessor(std::vector<float>{0, 0, 0, 1, 1, 1}, "VEC3")}})["mode"] = 1;
+    const outcome none = draw(folder, lines, "o.npy", {"-t", "fraction"});
+    EXPECT_EQ(2, none.code);
+    EXPECT_NE(std::string::npos, none.err.find("--target fraction needs triangles")) << none.err;
+}
+
+TEST(Fraction, EveryFormatOfValuesHoldsIt) {
+    const scratch_folder folder;
+    builder file;
+    add(file, tilted);
+    for (const char* const output : {"o.npz", "o.vti", "o.pvti", "o.nrrd", "o.zarr", "o.png", "o.html"}) {
+        const outcome result = draw(folder, file, output, {"-t", "fraction", "--image-size", "64x48"});
+        EXPECT_EQ(0, result.code) << output << ": " << result.err;
+        EXPECT_EQ(std::string::npos, result.err.find("warning")) << output << ": " << result.err;
+    }
+    const outcome result = draw(folder, file, "o.nvdb", {"-t", "fraction", "--solid", "nonzero"});
+    EXPECT_EQ(0, result.code) << result.err;
+}
+
+TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
+    const scratch_folder folder;
+    builder file;
+    add(file, tilted);
+    const auto refused = [&](std::vector<std::string> arguments, const std::string& why, int code = 1,
+                             const std::string& output = "o.npy") {
+        const outcome result = draw(folder, file, output, arguments);
+        EXPECT_EQ(code, result.code) << why << ": " << result.err;
+        EXPECT_NE(std::string::npos, result.err.find(why)) << result.err;
+        EXPECT_FALSE(fs::exists(folder / output));
+    };
+    for (const std::string rule : {"even_odd", "positive", "each_draw", "exterior"})
+        refused({"-t", "fraction", "--solid", rule}, "--solid " + rule + " and --target fraction do not go together");
+    refused({"-t", "fraction", "--solid", "nonzero", "--vote"}, "--vote and --target fraction");
+    refused({"-t", "fraction", "--solid", "nonzero", "--close-holes"}, "--close-holes and --target fraction");
+    refused({"-t", "fraction", "--coverage", "thin"}, "--coverage and --target fraction");
+    refused({"-t", "fraction", "--alpha", "cutoff"}, "--alpha cutoff and --target fraction");
+    refused({"-t", "fraction", "--sparse"}, "--sparse and --target fraction");
+    refused({"-t", "fraction", "--resume"}, "one piece of work");
+    refused({"-t", "fraction", "--levels"}, "--levels and --target fraction", 1, "o.zarr");
+    refused({"-t", "fraction", "--distance"}, "fraction does not go with --distance");
+    refused({"-t", "fraction"}, "adds the inside", 1, "o.nvdb");
+    refused({"--clamp"}, "--clamp goes with --target fraction");
+    refused({"-t", "fraction", "--backend", "cuda"}, "on the CPU alone", 5);
+    const outcome large =
+        run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", "fraction", "-r", "1000", "--max-memory", "300"});
+    EXPECT_EQ(3, large.code) << large.err;
+    EXPECT_NE(std::string::npos, large.err.find("300 MiB")) << large.err;
+    EXPECT_FALSE(fs::exists(folder / "o.npy"));
+}
+
+} // namespace
