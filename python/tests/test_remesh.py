@@ -31,7 +31,7 @@ def judge(vertices, faces):
 def test_a_remesh_of_crossing_boxes_is_closed_and_keeps_its_planes():
     soup = np.concatenate([BOX, 0.6 + BOX])
     faces = np.concatenate([FACES, 8 + FACES])
-    grid = vp.fit(soup, 24)
+    grid = vp.fit((soup, faces), 24)
     counts = {}
     vertices, triangles, more = vp.remesh((soup, faces), grid, status=counts)
     mesh = judge(vertices, triangles)
@@ -47,7 +47,7 @@ def test_a_remesh_of_crossing_boxes_is_closed_and_keeps_its_planes():
 
 def test_random_voxels_and_fields_are_closed():
     rng = np.random.default_rng(3)
-    grid = vp.Grid((0, 0, 0), 0.5, (17, 9, 11))
+    grid = vp.Grid((0, 0, 0), (0.5,) * 3, (17, 9, 11))
     inside = rng.random(grid.shape) < 0.5
     for place in ("corner", "mean", "sharp"):
         judge(*vp.extract(inside, grid, place=place)[:2])
@@ -59,7 +59,7 @@ def test_random_voxels_and_fields_are_closed():
 
 
 def test_corners_of_one_voxel():
-    grid = vp.Grid((1, 2, 3), 0.5, (3, 3, 3))
+    grid = vp.Grid((1, 2, 3), (0.5,) * 3, (3, 3, 3))
     inside = np.zeros(grid.shape, bool)
     inside[1, 1, 1] = True
     vertices, triangles, more = vp.extract(inside, grid, place="corner")
@@ -70,7 +70,7 @@ def test_corners_of_one_voxel():
 
 
 def test_bad_arguments():
-    grid = vp.Grid((0, 0, 0), 1, (4, 4, 4))
+    grid = vp.Grid((0, 0, 0), (1, 1, 1), (4, 4, 4))
     with pytest.raises(TypeError, match="bool"):
         vp.extract(np.zeros(grid.shape, np.int32), grid)
     with pytest.raises(ValueError, match="level"):

@@ -117,7 +117,7 @@ struct cell_face {
     for (int corners = 0; corners < 256; ++corners) {
         const cell_sheets plain = find_sheets(corners, cell_sheets::no_face);
         table[static_cast<std::size_t>(corners)] = plain;
-        table[static_cast<std::size_t>(256 + corners)] = find_sheets(corners, plain.joined_face());
+        table[256U + static_cast<std::size_t>(corners)] = find_sheets(corners, plain.joined_face());
     }
     return table;
 }

@@ -34,8 +34,9 @@ struct read_samples {
             if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, bool>) {
                 inside = value;
             } else {
-                inside = exact::to_double(value) < level;
-                nans += value != value ? 1 : 0;
+                const double number = exact::to_double(value);
+                inside = number < level;
+                nans += number >= 0 || number < 0 ? 0 : 1; // not a number
             }
             word |= inside ? 1u << bit : 0u;
         }
