@@ -141,10 +141,9 @@ struct surface_counters {
 
 // What voxelize_cells counts besides `counters`; zeros from other calls. Volumes are multiples of 2^-44 of a voxel.
 struct cell_counters {
-    // The sum of the fractions of the call's voxels, of all bodies: the lower 64 bits of a signed number of 128 bits,
-    // and the upper ones.
-    std::uint64_t volume_low = 0;
-    std::int64_t volume_high = 0;
+    // The sum of the fractions of the call's voxels, of all bodies, is a signed number of 128 bits.
+    std::uint64_t volume_low = 0;   // its lower 64 bits
+    std::int64_t volume_high = 0;   // its upper 64 bits
     std::uint64_t cut_voxels = 0;   // voxels that a triangle's inside reaches; with bodies::draw once a draw
     std::uint64_t below_zero = 0;   // fractions below -2^-24
     std::uint64_t above_one = 0;    // fractions above 1 + 2^-24

@@ -28,7 +28,7 @@ struct all_shader {
     }
 };
 
-struct cells {
+struct cell_values {
     glm::ivec3 extent;
     std::vector<float> fractions; // x fastest
     std::vector<std::int64_t> units, apertures, next;
@@ -39,8 +39,8 @@ struct cells {
 };
 
 // Each mesh is a draw; their fragments add up.
-inline cells library_cells(const std::vector<mesh>& draws, const vp::grid& g, const vp::cell_options& options = {},
-                           unsigned threads = 2) {
+inline cell_values library_cells(const std::vector<mesh>& draws, const vp::grid& g,
+                                 const vp::cell_options& options = {}, unsigned threads = 2) {
     vp::cpu_backend backend(threads);
     std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, all_shader>> all;
     for (const mesh& m : draws) all.push_back({m.view(), {}, {}});
@@ -58,8 +58,8 @@ inline cells library_cells(const std::vector<mesh>& draws, const vp::grid& g, co
             vp::get<4>(fb).to_host(backend),
             s};
 }
-inline cells library_cells(const mesh& m, const vp::grid& g, const vp::cell_options& options = {},
-                           unsigned threads = 2) {
+inline cell_values library_cells(const mesh& m, const vp::grid& g, const vp::cell_options& options = {},
+                                 unsigned threads = 2) {
     return library_cells(std::vector<mesh>{m}, g, options, threads);
 }
 

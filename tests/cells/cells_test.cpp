@@ -14,7 +14,7 @@ namespace {
 using namespace cells;
 
 // The sum of the units is the status' volume.
-std::int64_t volume_of(const cells::cells& c) {
+std::int64_t volume_of(const cell_values& c) {
     const auto sum = std::accumulate(c.units.begin(), c.units.end(), std::int64_t{0});
     EXPECT_EQ(static_cast<std::int64_t>(c.status.cells.volume_low), sum);
     EXPECT_EQ(c.status.cells.volume_high, sum < 0 ? -1 : 0);

@@ -25,11 +25,11 @@ struct remesh_options {
     voxelpipe::place place = voxelpipe::place::sharp;     // where vertices lie
     voxelpipe::sample sample = voxelpipe::sample::centre; // where samples lie
     // What is inside, as in solid_options.
-    fill_rule rule = fill_rule::nonzero;
-    voxelpipe::bodies bodies = voxelpipe::bodies::call;
-    voxelpipe::repair repair = voxelpipe::repair::none;
-    int closing = 0;
-    std::uint64_t max_hole_edges = std::numeric_limits<std::uint64_t>::max();
+    fill_rule rule = fill_rule::nonzero;                // which windings are inside
+    voxelpipe::bodies bodies = voxelpipe::bodies::call; // of what: all draws together, or each by itself
+    voxelpipe::repair repair = voxelpipe::repair::none; // of meshes that are not closed
+    int closing = 0;                                    // of repair::exterior, in voxels
+    std::uint64_t max_hole_edges = std::numeric_limits<std::uint64_t>::max(); // of holes that close_holes closes
     // World units. Not 0: the surface lies where the signed distance is `level`; above 0 bodies grow by it, and a sheet
     // becomes a closed plate twice as thick. Vertices with place::sharp then lie as with place::mean.
     double level = 0.0;

@@ -60,6 +60,7 @@ struct surface_vertex {
 // a quad is that of its lowest cell; triangles 2 i and 2 i + 1 are quad i.
 template <class Backend>
 struct surface {
+    // Memory of the backend.
     template <class T>
     using buffer = typename Backend::template buffer<T>;
 
@@ -69,6 +70,7 @@ struct surface {
     buffer<glm::uvec4> quads;        // empty without
     buffer<std::uint32_t> sources;   // of remesh: a primitive that a vertex comes from, the lowest one; 2^32 - 1: none
 
+    // Empty.
     explicit surface(Backend& backend)
         : vertices(backend, 0), triangles(backend, 0), quads(backend, 0), sources(backend, 0) {}
 };
