@@ -16,9 +16,9 @@
 #include <string>
 #include <vector>
 
-namespace {
-
 namespace vp = voxelpipe;
+
+namespace {
 using device_test::mesh_data;
 
 // All that a fragment has, and a discard.
@@ -71,6 +71,8 @@ void expect_same(const std::vector<mesh_data>& meshes, const vp::grid& g, const 
     });
 }
 
+} // namespace
+
 TEST(DeviceCells, TrianglesOfAllSizesHaveTheBytesOfTheCpu) {
     const glm::ivec3 extent{33, 26, 21};
     mesh_data m = device_test::mixed_triangles(120, 25, 5);
@@ -102,5 +104,3 @@ TEST(DeviceCells, NothingAndBadIndices) {
     EXPECT_EQ(draw(gpu, {m}, g, vp::fraction{}, fb, {}).code, vp::status_code::index_out_of_range);
     for (const float f : vp::get<0>(fb).to_host(gpu)) EXPECT_EQ(f, 0.0f);
 }
-
-} // namespace

@@ -15,6 +15,7 @@
 #include "sparse.hpp"
 #include "targets.hpp"
 
+#include <voxelpipe/cells/device/cells.cuh>
 #include <voxelpipe/device/backend.cuh>
 
 #include <cuda_runtime.h>
