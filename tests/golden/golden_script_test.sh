@@ -108,6 +108,6 @@ printf 'exit 3\n' >>build/tests/golden/golden_hashes
 expect 1 'golden_hashes has failed'
 sed -i '$d' build/tests/golden/golden_hashes
 printf 'echo "no memory"\nexit 3\n' >>build/tool/voxelize
-with= expect 1 'file.zarr: the tool has failed: no memory' --every 20
+with= expect 1 ': the tool has failed: no memory' --every 20
 
 [[ $failures -eq 0 ]]
