@@ -189,7 +189,7 @@ void pipeline<Backend>::examine_solid_bits(const voxelpipe::grid& whole) {
 
 template <class Backend>
 void pipeline<Backend>::draw_fractions(volume& result) {
-    // What the passes before it have worked in is not needed any more.
+    // The surface and the solid are drawn; their working memory is freed before the fractions take theirs.
     surface_framebuffer_.reset();
     bits_framebuffer_.reset();
     solid_framebuffer_.reset();
