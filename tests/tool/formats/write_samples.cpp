@@ -102,7 +102,7 @@ std::vector<sample_case> make_cases() {
     add("one", {1, 1, 1}, 1, true, false, solid);
     add("plain", {32, 32, 32}, 5, false, false, solid);
     add("odd", {37, 23, 11}, 5, true, false, solid);
-    add("words", {65, 64, 63}, 3, true, false, solid);
+    add("words", {65, 33, 9}, 3, true, false, solid);
     add("thin", {3, 1, 200}, 2, true, false, solid);
     add("long", {300, 17, 40}, 23, true, false, solid);
     add("split", {260, 40, 513}, 997, true, false, {".vox", ".schem", ".binvox"}).options.up = up_axis::z;
