@@ -275,7 +275,8 @@ def save(
     appears whole or not at all. A file that a model was read from in this process (the path of a mesh, and what that file
     names), or that holds one of the values (numpy.memmap), is not replaced: ValueError.
 
-    .npy: one array, as it is. .npz: the arrays by name, with origin and voxel_size. .nvdb (NanoVDB): the occupied voxels
+    "FOLDER/{z}.png": a grey picture of each layer, 0000.png and so on, y upwards: of bools 0 and 255, of floats from 0 to 1 in
+    16 bits, uint8 and uint16 as they are. .npy: one array, as it is. .npz: the arrays by name, with origin and voxel_size. .nvdb (NanoVDB): the occupied voxels
     with their values, a grid for each name. .png: a picture, see render(). .html: a page, see view(). .vti, .pvti, .nrrd and
     .zarr: all arrays. .vox, .schem, .litematic, .binvox, .glb, .obj, .ply, .stl, .3mf, .xyz: the occupied voxels, with the
     first array of colours where the format has any.
@@ -314,6 +315,8 @@ def save(
         check_choice("up", up, Up)
     target = os.fspath(path)
     extension = os.path.splitext(target)[1].lower()
+    if "{z}" in os.path.basename(target):
+        extension = "{z}" + extension
     if extension not in _formats:
         raise ValueError(f"{target}: the formats are {', '.join(_formats)}")
     view_of = {"size": size, "azimuth": azimuth, "elevation": elevation, "zoom": zoom, "background": background}

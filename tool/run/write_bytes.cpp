@@ -76,7 +76,12 @@ double bytes_to_write(const std::filesystem::path& output, const expected_result
         constexpr double chunk_voxels = 64 * 64 * 64, copies = 2.3; // as it is, and with room for what it becomes
         bytes += threads * (bytes_of_thread / 2 + copies * chunk_voxels * values.largest);
     }
-    const bool reads_tiles = is_one_of(extension, {".nvdb", ".vdb", ".vti", ".pvti", ".nrrd", ".zarr"});
+    const bool reads_tiles = is_one_of(extension, {".nvdb", ".vdb", ".vti", ".pvti", ".nrrd", ".zarr", "{z}.png"});
+    if (extension == "{z}.png") { // a layer's values, its pixels and the file of them, and files that wait
+        constexpr double waiting = 4, of_pixel = 2;
+        const double pixels = static_cast<double>(result.extent.x) * result.extent.y;
+        bytes += threads * pixels * (std::max(1.0, values.largest) + (2 + waiting) * of_pixel);
+    }
     if (!reads_tiles && result.in_tiles > 0) { // a second volume, and a list of its bricks
         constexpr double source_bytes = 24, brick_voxels = 512;
         bricks += result.in_tiles / brick_voxels;

@@ -313,7 +313,7 @@ std::vector<std::filesystem::path> write_sparse_png(const sparse_volume& v, cons
 // Formats whose writers take the channels piece by piece, so that no dense one is ever there.
 bool is_streamed(const std::string& extension) {
     return extension == ".npy" || extension == ".npz" || extension == ".vti" || extension == ".pvti" ||
-           extension == ".nrrd" || extension == ".zarr";
+           extension == ".nrrd" || extension == ".zarr" || extension == "{z}.png";
 }
 
 } // namespace

@@ -847,6 +847,30 @@ def check_png(case, files):
     assert colors > 20, f"only {colors} colours"
 
 
+def check_slices(case, files):
+    """Layers from 0000.png on, whose first row is the highest y."""
+    import numpy as np
+    from PIL import Image
+
+    nx, ny, nz = case["extent"]
+    if case["name"] == "slices":
+        want = expected(case, 0) * np.uint8(255)
+    else:
+        k, j, i = np.ogrid[:nz, :ny, :nx]
+        share = np.clip((i + 2 * j + 3 * k).astype(np.float32) / 64 - np.float32(0.25), 0, 1)
+        white, kind = (255, np.uint8) if case["name"] == "bytes_of_shares" else (65535, np.uint16)
+        want = np.floor(share.astype(np.float64) * white + 0.5).astype(kind)
+    assert len(files) == nz
+    for layer, file in enumerate(files):
+        assert file.name == f"{layer:04}.png", file.name
+        with Image.open(file) as picture:
+            picture.load()
+            assert picture.format == "PNG" and picture.info["gamma"] == 1
+            assert picture.mode == ("L" if want.dtype == np.uint8 else "I;16"), picture.mode
+            pixels = np.asarray(picture)
+        assert np.array_equal(pixels[::-1], want[layer]), f"layer {layer} differs"
+
+
 def page_volume(file):
     """(description, occupied (nz, ny, nx), {channel: values by voxel}, indices of the voxels) of a page, as page.html says."""
     import base64

@@ -11,6 +11,7 @@
 
 #include <cstdio>
 #include <iostream>
+#include <limits>
 #include <map>
 
 using namespace voxelize;
@@ -85,6 +86,16 @@ void add_materials(volume& v) {
                 store(c.data.data() + 4 * v.index(i, j, k), static_cast<std::int32_t>(pattern(i, j, k, 9, 0) % 6) - 1);
 }
 
+// Floats around 0 to 1, and NaN: (i + 2 j + 3 k) / 64 - 0.25.
+void fill_shares(volume& v) {
+    channel& c = v.add("fraction", scalar::f32);
+    for (std::int64_t k = 0; k < v.extent[2]; ++k)
+        for (std::int64_t j = 0; j < v.extent[1]; ++j)
+            for (std::int64_t i = 0; i < v.extent[0]; ++i)
+                store(c.data.data() + 4 * v.index(i, j, k), static_cast<float>(i + 2 * j + 3 * k) / 64 - 0.25F);
+    store(c.data.data(), std::numeric_limits<float>::quiet_NaN());
+}
+
 std::vector<sample_case> make_cases() {
     const std::vector<std::string> any{".npy", ".npz", ".vti", ".pvti", ".nrrd", ".zarr"};
     const std::vector<std::string> solid{".npy",   ".npz",       ".vti",    ".nrrd", ".zarr", ".vox",
@@ -145,6 +156,14 @@ std::vector<sample_case> make_cases() {
     cases.push_back({"levels", with_targets({150, 20, 270}, 7), 7, {".zarr"}, {}});
     cases.back().v.voxel_size = {0.1, 0.25, 3};
     cases.back().options.levels = true;
+    add("slices", {37, 23, 11}, 5, false, false, {"/{z}.png"});
+    sample_case& shares = add("shares", {37, 23, 300}, 5, false, false, {"/{z}.png"});
+    shares.v.channels.clear();
+    fill_shares(shares.v);
+    shares.options.compression = 0;
+    cases.push_back(shares);
+    cases.back().name = "bytes_of_shares";
+    cases.back().options.slice_bits = 8;
     add("glass", {16, 16, 16}, 2, true, false, {".png"}).options.preview.backdrop = *parse_background("transparent");
     return cases;
 }
@@ -217,9 +236,13 @@ int main(int argc, char** argv) {
         std::string manifest;
         for (const sample_case& c : make_cases()) {
             std::map<std::string, std::vector<std::string>> files;
-            for (const std::string& extension : c.extensions)
-                for (const auto& path : write(c.v, folder / (c.name + extension), c.options))
-                    files[extension].push_back(path.filename().string());
+            for (const std::string& extension : c.extensions) {
+                const std::filesystem::path path = folder / (c.name + extension);
+                std::filesystem::create_directories(path.parent_path());
+                for (const auto& file : write(c.v, path, c.options))
+                    files[extension == "/{z}.png" ? ".slices" : extension].push_back(
+                        file.lexically_relative(folder).string());
+            }
             if (c.density != 0 && c.extensions.front() == ".npy") {
                 const sparse_volume bricks = make_sparse(c.v, 1);
                 for (const std::string extension : {".npz", ".npy"})

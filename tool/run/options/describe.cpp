@@ -416,8 +416,13 @@ void describe_output(CLI::App& app, command_line& options) {
                "How the chunks of .zarr are compressed: gzip, which every reader has, or zstd. Default: gzip")
         ->option_text("NAME")
         ->group("Files");
+    app.add_option("--slice-bits", options.write.slice_bits,
+                   "Bits of a pixel of {z}.png: 8 or 16. Default: 8 of occupancy, 16 of fractions")
+        ->check(CLI::IsMember({8, 16}))
+        ->option_text("N")
+        ->group("Files");
     app.add_option("--compression", options.write.compression,
-                   "Level of .npz, .vti, .nrrd, .zarr, .3mf, .schem and .litematic, 0 to 9. Default: 1")
+                   "Level of .npz, .vti, .nrrd, .zarr, .3mf, .schem, .litematic and {z}.png, 0 to 9. Default: 1")
         ->check(between(0, 9))
         ->option_text("N")
         ->group("Files");

@@ -263,6 +263,9 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     for (const std::filesystem::path& output : options.outputs) {
         if (output == "-") throw usage_error("-o -: standard output needs its format before a colon, as in -o npy:-");
         const format* found = find_format(output);
+        if (found == nullptr && lower_extension(output).starts_with(layer_place))
+            throw usage_error("\"" + output.string() +
+                              "\": {z} is the number of a layer, and only .png is a file for each layer");
         if (found == nullptr && lower_extension(output) == ".vdb")
             throw usage_error("\"" + output.string() +
                               "\": this program was built without OpenVDB (libopenvdb-dev); .nvdb needs no library");
@@ -297,6 +300,7 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     };
     require(options.write.levels, "--levels", "levels", ".zarr has", &format::has_levels);
     require(options.write.pieces != 0, "--pieces", "pieces", ".pvti and .nvdb have", &format::has_pieces);
+    require(options.write.slice_bits != 0, "--slice-bits", "slices", "{z}.png has", &format::has_layers);
     require(!options.block_file.empty(), "--blocks", "blocks", ".schem and .litematic have", &format::has_blocks);
     if (!options.block_file.empty()) {
         try {
@@ -346,6 +350,11 @@ void understand_outputs(command_line& options, const raw_options& raw) {
         targets.push_back(target::occupancy);
         if (shows_colors && !raw.no_color && !options.voxelize.remesh) options.implied.push_back(target::color);
     }
+    for (const std::filesystem::path& output : options.outputs)
+        if (find_format(output)->has_layers &&
+            (targets.size() != 1 || (targets[0] != target::occupancy && targets[0] != target::fraction)))
+            throw usage_error("\"" + output.string() +
+                              "\": slices hold one target, which is occupancy or fraction: name it by --target");
     if (options.blocks && !options.blocks->materials.empty() &&
         std::find(targets.begin(), targets.end(), target::material) == targets.end())
         options.implied.push_back(target::material);

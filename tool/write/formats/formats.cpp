@@ -11,6 +11,7 @@
 #include "nrrd.hpp"
 #include "png.hpp"
 #include "schem.hpp"
+#include "slices.hpp"
 #include "text.hpp"
 #include "vox.hpp"
 #include "voxel_shape.hpp"
@@ -60,6 +61,8 @@ constexpr auto all_formats = std::to_array<format>({
      false},
     {".xyz", "centres of the voxels as text: x y z and red green blue, 0 to 255", true, false, true, false},
     {".png", "shaded picture of the voxels", true, false, true, false},
+    {"{z}.png", "grey slices along z, OUT/0000.png, ...: occupancy, or fractions; see --slice-bits", false, true, false,
+     false, false, false, false, false, true},
     {".html", "a page that shows the voxels in a browser: turn, cut, choose values", true, true, true, false},
     {".nvdb", "NanoVDB: a grid for each channel, of the occupied voxels alone", true, true, true, false, true, false,
      true},
@@ -85,6 +88,7 @@ constexpr auto all_writers = std::to_array<writer>({
     {nullptr, write_3mf, mesh_names},
     {nullptr, write_xyz},
     {write_png},
+    {write_slices, nullptr, slice_names},
     {write_page},
     {write_nvdb},
 #ifdef VOXELIZE_HAS_OPENVDB
@@ -130,7 +134,7 @@ std::string_view why_no_stream(const format& f) {
     constexpr std::array<std::string_view, 4> seek{".npz", ".vti", ".3mf", ".vdb"};
     if (std::find(seek.begin(), seek.end(), f.extension) != seek.end())
         return "it has what is known only at the end before what comes earlier";
-    if (f.extension == ".pvti" || f.extension == ".zarr") return "it is several files";
+    if (f.extension == ".pvti" || f.extension == ".zarr" || f.has_layers) return "it is several files";
     return {};
 }
 

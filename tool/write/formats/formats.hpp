@@ -24,9 +24,11 @@ namespace voxelize {
 struct block_list; // blocks.hpp
 
 struct write_options {
-    // zlib level of .npz, .vti, .nrrd, .zarr, .3mf, .schem, .litematic: 0 stores (the last two: 1), 9 is smallest
+    // zlib level of .npz, .vti, .nrrd, .zarr, .3mf, {z}.png, .schem, .litematic: 0 stores (the last two: 1), 9 is
+    // smallest
     int compression = 1;
     bool zstd = false;   // .zarr: Zstandard instead of gzip, where has_zstd()
+    int slice_bits = 0;  // {z}.png: bits of a pixel, 8 or 16; 0: as slices.hpp says
     bool levels = false; // .zarr: each channel with its mip levels, an OME-Zarr multiscale group
     int pieces = 0;      // .pvti, .nvdb: slabs along z, each a piece or a grid of each channel; 0: as these say:
     std::uint64_t piece_bytes = 1 << 30;         // .pvti: of values in a piece, about
@@ -58,6 +60,7 @@ struct format {
     bool has_levels = false;      // obeys write_options::levels
     bool has_pieces = false;      // obeys write_options::pieces
     bool has_blocks = false;      // obeys write_options::blocks
+    bool has_layers = false;      // a file for each layer of one target: obeys write_options::slice_bits
 };
 
 // True if voxels of this size are cubes, but for what fitting a grid loses by rounding.

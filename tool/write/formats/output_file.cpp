@@ -129,6 +129,7 @@ std::string lower_extension(const std::filesystem::path& path) {
         is_standard_output(path) ? '.' + whole.substr(0, whole.size() - 2) : path.extension().string();
     for (char& c : extension)
         if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    if (path.filename().string().find(layer_place) != std::string::npos) extension.insert(0, layer_place);
     return extension;
 }
 
