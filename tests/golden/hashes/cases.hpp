@@ -36,6 +36,10 @@ void add_solids(case_table<Backend>& cases);
 template <class Backend>
 void add_cells(case_table<Backend>& cases);
 template <class Backend>
+void add_distances(case_table<Backend>& cases);
+template <class Backend>
+void add_surfaces(case_table<Backend>& cases);
+template <class Backend>
 void add_targets(case_table<Backend>& cases);
 template <class Backend>
 void add_integer_targets(case_table<Backend>& cases);
@@ -56,6 +60,8 @@ case_table<Backend> all_cases() {
     add_coverages(cases);
     add_solids(cases);
     add_cells(cases);
+    add_distances(cases);
+    add_surfaces(cases);
     add_targets(cases);
     add_integer_targets(cases);
     add_lists(cases);

@@ -6,6 +6,7 @@
 
 #include "cells.hpp"
 #include "coverages.hpp"
+#include "distances.hpp"
 #include "levels.hpp"
 #include "lists.hpp"
 #include "main.hpp"
@@ -13,10 +14,13 @@
 #include "slabs.hpp"
 #include "solids.hpp"
 #include "sparse.hpp"
+#include "surfaces.hpp"
 #include "targets.hpp"
 
 #include <voxelpipe/cells/device/cells.cuh>
 #include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/distance/device/distance.cuh>
+#include <voxelpipe/surfaces/device/surfaces.cuh>
 
 #include <cuda_runtime.h>
 
