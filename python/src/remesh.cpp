@@ -63,6 +63,19 @@ nb::tuple arrays_of(cpu_backend& backend, const surface<cpu_backend>& made, cons
                           to_numpy(std::move(sources), {with_source}), report_surface(s));
 }
 
+// make(backend, surface) makes the surface, without Python's lock.
+template <class Make>
+nb::tuple made_surface(const grid& world, unsigned threads, const Make& make) {
+    cpu_backend backend{threads};
+    surface<cpu_backend> made(backend);
+    status s;
+    {
+        const nb::gil_scoped_release released;
+        s = make(backend, made);
+    }
+    return arrays_of(backend, made, world, s);
+}
+
 // As voxelpipe/_remesh.py has them. Throws ValueError.
 nb::tuple remesh_parts(const position_array& positions, const triangle_array& triangles,
                        const std::vector<std::uint64_t>& first_triangles, const grid& g, const grid& world,
@@ -81,15 +94,10 @@ nb::tuple remesh_parts(const position_array& positions, const triangle_array& tr
     options.quads = quads;
     options.min_component = min_component;
     const mesh_view<> mesh = view_of(positions, triangles);
-    cpu_backend backend{threads};
-    surface<cpu_backend> made(backend);
-    status s;
-    {
-        const nb::gil_scoped_release released;
+    return made_surface(world, threads, [&](cpu_backend& backend, surface<cpu_backend>& made) {
         const auto draws = draws_of_parts<draw<mesh_view<>, passthrough, none>>(mesh, first_triangles, none{});
-        s = remesh(backend, draws, g, made, options);
-    }
-    return arrays_of(backend, made, world, s);
+        return remesh(backend, draws, g, made, options);
+    });
 }
 
 extract_options extract_options_named(const std::string& place_name, double level, bool open, bool quads,
@@ -102,11 +110,8 @@ nb::tuple extract_bits(const array<const std::uint8_t, 3>& values, const grid& g
                        bool open, bool quads, std::uint32_t min_component, unsigned threads) {
     expect_shape(values, g, "the array");
     using bits = target<bit, blend::replace>;
-    cpu_backend backend{threads};
-    surface<cpu_backend> made(backend);
-    status s;
-    {
-        const nb::gil_scoped_release released;
+    const extract_options options = extract_options_named(place_name, 0.0, open, quads, min_component);
+    return made_surface(g, threads, [&](cpu_backend& backend, surface<cpu_backend>& made) {
         framebuffer<cpu_backend, bits> inside(backend, g.extent);
         const target_view<bits>& view = get<0>(inside.view().targets);
         const std::uint8_t* const from = values.data();
@@ -114,25 +119,20 @@ nb::tuple extract_bits(const array<const std::uint8_t, 3>& values, const grid& g
         for (int z = 0; z < g.extent.z; ++z)
             for (int y = 0; y < g.extent.y; ++y)
                 for (int x = 0; x < g.extent.x; ++x) view.store(x, y, z, from[i++] != 0);
-        s = extract(backend, view, g, made, extract_options_named(place_name, 0.0, open, quads, min_component));
-    }
-    return arrays_of(backend, made, g, s);
+        return extract(backend, view, g, made, options);
+    });
 }
 
 nb::tuple extract_field(const array<const float, 3>& values, const grid& g, const std::string& place_name, double level,
                         bool open, bool quads, std::uint32_t min_component, unsigned threads) {
     expect_shape(values, g, "the array");
     using field = target<float, blend::replace>;
-    cpu_backend backend{threads};
-    surface<cpu_backend> made(backend);
-    status s;
-    {
-        const nb::gil_scoped_release released;
+    const extract_options options = extract_options_named(place_name, level, open, quads, min_component);
+    return made_surface(g, threads, [&](cpu_backend& backend, surface<cpu_backend>& made) {
         // The view is of a target that could be written; extract reads it.
         const target_view<field> view{const_cast<float*>(values.data()), g.extent}; // NOLINT(*-const-cast)
-        s = extract(backend, view, g, made, extract_options_named(place_name, level, open, quads, min_component));
-    }
-    return arrays_of(backend, made, g, s);
+        return extract(backend, view, g, made, options);
+    });
 }
 
 } // namespace

@@ -235,6 +235,13 @@ void require_vertices(const scene& model, const voxelize_request& request, doubl
                     memory::fewer_voxels_hint, least + parts.varyings + parts.triangles + parts.lines);
 }
 
+void require_cpu(const voxelize_request& request, const std::string& why, voxelize_stats& stats) {
+    if (request.backend == backend_choice::cuda) throw backend_error("--backend cuda: " + why + "; use --backend cpu");
+    if (request.strategy != voxelpipe::strategy::automatic || request.devices != 1)
+        throw backend_error(std::string(request.devices != 1 ? "--devices" : "--strategy") + " needs a GPU: " + why);
+    if (request.backend == backend_choice::automatic) stats.no_cuda = why;
+}
+
 volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
     const double need = dense_need(model, request);
     memory::expect(need);
@@ -246,13 +253,10 @@ volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_st
         const bool only_cpu =
             request.wants(target::fraction) || (request.solid && request.solid->fill == solid_fill::nearest);
         if (only_cpu)
-            stats.no_cuda = std::string(request.wants(target::fraction) ? "--target fraction" : "--fill nearest") +
-                            " is drawn on the CPU alone";
-        if (only_cpu && request.backend == backend_choice::cuda)
-            throw backend_error("--backend cuda: " + stats.no_cuda + "; use --backend cpu");
-        if (only_cpu && (request.strategy != voxelpipe::strategy::automatic || request.devices != 1))
-            throw backend_error(std::string(request.devices != 1 ? "--devices" : "--strategy") +
-                                " needs a GPU: " + stats.no_cuda);
+            require_cpu(request,
+                        std::string(request.wants(target::fraction) ? "--target fraction" : "--fill nearest") +
+                            " is drawn on the CPU alone",
+                        stats);
         if (request.backend != backend_choice::cpu && !only_cpu)
             if (std::optional<volume> result = try_cuda(model, inside, stats))
                 return with_ring(std::move(*result), request);

@@ -132,6 +132,10 @@ struct backend_error : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+// For work that no GPU does, `why` says which: throws backend_error where the request asks for a GPU, for a strategy of
+// one or for several; says in `stats` why the choice falls on the CPU where there is one.
+void require_cpu(const voxelize_request& request, const std::string& why, voxelize_stats& stats);
+
 // Consumes the scene: its arrays move to the backend. The backend `automatic` is the first GPU where that can be used
 // and the work takes longer on the CPU, by backend_estimate.hpp; a warning where only the GPU's memory was too small.
 // Throws memory_error, backend_error, and std::runtime_error for what the library refuses.

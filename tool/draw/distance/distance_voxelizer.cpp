@@ -223,13 +223,7 @@ double distance_need(const scene& model, const voxelize_request& request) {
 }
 
 volume run_distance_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
-    const std::string only_cpu = "distances are drawn on the CPU alone";
-    if (request.backend == backend_choice::cuda)
-        throw backend_error("--backend cuda: " + only_cpu + "; use --backend cpu");
-    if (request.strategy != voxelpipe::strategy::automatic || request.devices != 1)
-        throw backend_error(std::string(request.devices != 1 ? "--devices" : "--strategy") +
-                            " needs a GPU: " + only_cpu);
-    if (request.backend == backend_choice::automatic) stats.no_cuda = only_cpu;
+    require_cpu(request, "distances are drawn on the CPU alone", stats);
     const double need = distance_need(model, request);
     const glm::ivec3 extent = request.grid.extent;
     memory::expect(need);

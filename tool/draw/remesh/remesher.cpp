@@ -90,13 +90,7 @@ double remesh_need(const scene& model, const voxelize_request& request) {
 }
 
 surface_mesh run_remesher(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
-    const std::string only_cpu = "--remesh runs on the CPU alone";
-    if (request.backend == backend_choice::cuda)
-        throw backend_error("--backend cuda: " + only_cpu + "; use --backend cpu");
-    if (request.strategy != voxelpipe::strategy::automatic || request.devices != 1)
-        throw backend_error(std::string(request.devices != 1 ? "--devices" : "--strategy") +
-                            " needs a GPU: " + only_cpu);
-    if (request.backend == backend_choice::automatic) stats.no_cuda = only_cpu;
+    require_cpu(request, "--remesh runs on the CPU alone", stats);
     const double need = remesh_need(model, request);
     const glm::ivec3 extent = request.grid.extent;
     memory::expect(need);
