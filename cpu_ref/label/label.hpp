@@ -220,7 +220,7 @@ namespace voxelpipe::core {
 // Implements label. Arguments are validated.
 template <class Label>
 [[nodiscard]] status run_module(label_tag, cpu_backend& backend, const std::uint32_t* bits, const glm::ivec3& extent,
-                                int connectivity, Label* labels, cpu_backend::buffer<component>* components) {
+                                int connectivity, Label* labels, cpu_backend::buffer<voxel_component>* components) {
     const cpu::execution how = backend.execution();
     const cpu::labeller<Label> of(bits, extent, connectivity, labels);
     const auto wide = [](int n) { return static_cast<std::uint64_t>(n); };
@@ -265,7 +265,7 @@ template <class Label>
     component_marks<cpu_backend> marks(backend, wide(extent.x) * wide(extent.y) * wide(extent.z));
     (void)flatten_rows(marks.data());
     s.label.components = marks.number(backend);
-    cpu_backend::buffer<component> made(backend, s.label.components);
+    cpu_backend::buffer<voxel_component> made(backend, s.label.components);
     const component_list list = marks.start(backend, made.data(), extent);
     for_blocks([&](std::uint64_t first, std::uint64_t last) {
         cpu::component_cache parts(list);

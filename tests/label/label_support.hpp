@@ -58,7 +58,7 @@ struct volume {
 struct result {
     vp::status status;
     std::vector<std::int64_t> labels;
-    std::vector<vp::component> components;
+    std::vector<vp::voxel_component> components;
     [[nodiscard]] bool is(const result& o) const {
         return status.ok() == o.status.ok() && status.label == o.status.label && labels == o.labels &&
                components == o.components;
@@ -72,7 +72,7 @@ template <class Label, class Layout = vp::layout::linear, class Backend>
     // What was there does not matter.
     const std::vector<Label> before(v.set.size(), Label{5});
     typename Backend::template buffer<Label> labels(backend, vp::array_view<const Label>(before));
-    typename Backend::template buffer<vp::component> components(backend, 0);
+    typename Backend::template buffer<vp::voxel_component> components(backend, 0);
     const vp::target_view<vp::target<vp::bit, vp::blend::replace, Layout>> from{bits.data(), v.extent};
     const vp::target_view<vp::target<Label, vp::blend::replace>> to{labels.data(), v.extent};
     const vp::label_options options{.connectivity = connectivity};
@@ -98,7 +98,7 @@ template <class Label, class Layout = vp::layout::linear, class Backend>
             for (int x = 0; x < v.extent.x; ++x, ++next) {
                 if (v.set[next] == 0 || r.labels[next] >= 0) continue;
                 const auto name = static_cast<std::int64_t>(next);
-                vp::component c{name, 0, glm::ivec3(x, y, z), glm::ivec3(x, y, z)};
+                vp::voxel_component c{name, 0, glm::ivec3(x, y, z), glm::ivec3(x, y, z)};
                 r.labels[next] = name;
                 queue.assign(1, glm::ivec3(x, y, z));
                 while (!queue.empty()) {

@@ -46,7 +46,7 @@ TEST(Label, RandomGridsAreTheFloods) {
             ASSERT_TRUE(wide.components.empty());
         }
         components += expected.components.size();
-        for (const vp::component& c : expected.components) voxels += c.voxels;
+        for (const vp::voxel_component& c : expected.components) voxels += c.voxels;
     }
     EXPECT_GT(components, 8 * count);
     EXPECT_GT(voxels, 50 * count);
@@ -171,8 +171,8 @@ TEST(Label, BadInputIsRefused) {
     labels.fill(7);
     const bits_view from{bits.data(), glm::ivec3(2, 3, 2)};
     const labels_view to{labels.data(), from.extent};
-    const std::vector<vp::component> kept{{3, 4, glm::ivec3(5), glm::ivec3(6)}};
-    vp::cpu_backend::buffer<vp::component> table(backend, vp::array_view<const vp::component>(kept));
+    const std::vector<vp::voxel_component> kept{{3, 4, glm::ivec3(5), glm::ivec3(6)}};
+    vp::cpu_backend::buffer<vp::voxel_component> table(backend, vp::array_view<const vp::voxel_component>(kept));
     const auto code_of = [&](const bits_view& b, const labels_view& l, int connectivity = 6) {
         const vp::status s = vp::label(backend, b, l, {.connectivity = connectivity});
         const vp::status with_table = vp::label(backend, b, l, table, {.connectivity = connectivity});

@@ -7,7 +7,7 @@
 #include <voxelpipe/core/layout.hpp>
 #include <voxelpipe/framebuffer.hpp>
 #include <voxelpipe/grid.hpp>
-#include <voxelpipe/label/component.hpp>
+#include <voxelpipe/label/voxel_component.hpp>
 #include <voxelpipe/status.hpp>
 #include <voxelpipe/voxelize.hpp>
 
@@ -80,7 +80,7 @@ struct read_bits {
 template <class Backend, class Blend, class Layout, class Label, class LabelBlend>
 [[nodiscard]] status find_components(Backend& backend, const target_view<target<bit, Blend, Layout>>& bits,
                                      const target_view<target<Label, LabelBlend>>& labels,
-                                     typename Backend::template buffer<component>* components,
+                                     typename Backend::template buffer<voxel_component>* components,
                                      const label_options& options) {
     static_assert(std::is_same_v<Label, std::int32_t> || std::is_same_v<Label, std::int64_t>,
                   "voxelpipe: labels are a target of std::int32_t or std::int64_t");
@@ -112,7 +112,8 @@ template <class Backend, class Blend, class Layout, class Label, class LabelBlen
 template <class Backend, class Blend, class Layout, class Label, class LabelBlend>
 [[nodiscard]] status label(Backend& backend, const target_view<target<bit, Blend, Layout>>& bits,
                            const target_view<target<Label, LabelBlend>>& labels, const label_options& options = {}) {
-    return core::find_components(backend, bits, labels, nullptr, options);
+    typename Backend::template buffer<voxel_component>* const no_list = nullptr; // nvcc deduces nothing from a nullptr
+    return core::find_components(backend, bits, labels, no_list, options);
 }
 
 // Lists the components too, by ascending names, each with its number of voxels and its bounding box. The list replaces
@@ -120,7 +121,7 @@ template <class Backend, class Blend, class Layout, class Label, class LabelBlen
 template <class Backend, class Blend, class Layout, class Label, class LabelBlend>
 [[nodiscard]] status label(Backend& backend, const target_view<target<bit, Blend, Layout>>& bits,
                            const target_view<target<Label, LabelBlend>>& labels,
-                           typename Backend::template buffer<component>& components,
+                           typename Backend::template buffer<voxel_component>& components,
                            const label_options& options = {}) {
     return core::find_components(backend, bits, labels, &components, options);
 }

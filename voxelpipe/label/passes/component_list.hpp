@@ -7,8 +7,9 @@
 
 #include <voxelpipe/core/exact.hpp>
 #include <voxelpipe/core/shared_counter.hpp>
-#include <voxelpipe/label/component.hpp>
+#include <voxelpipe/label/voxel_component.hpp>
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 
@@ -39,15 +40,15 @@ struct component_part {
     std::uint64_t voxels = 0;
     glm::ivec3 min{0}, max{0};
 
-    VOXELPIPE_HD void add(const component_part& o) {
+    void add(const component_part& o) {
         if (voxels == 0) {
             *this = o;
             return;
         }
         voxels += o.voxels;
         for (int a = 0; a < 3; ++a) {
-            if (o.min[a] < min[a]) min[a] = o.min[a];
-            if (o.max[a] > max[a]) max[a] = o.max[a];
+            min[a] = std::min(min[a], o.min[a]);
+            max[a] = std::max(max[a], o.max[a]);
         }
     }
 };
@@ -55,7 +56,7 @@ struct component_part {
 struct component_list {
     const std::uint32_t* marks;  // bit v % 32 of word v / 32: voxel v names a component
     const std::uint64_t* before; // for each word, the components that earlier words name
-    component* components;
+    voxel_component* components;
 
     // Number of the component that voxel v names.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t number(std::uint64_t v) const {
@@ -64,7 +65,7 @@ struct component_list {
     }
     // Threads may add parts at the same time.
     VOXELPIPE_HD void add(std::uint64_t number, const component_part& part) const {
-        component& c = components[number];
+        voxel_component& c = components[number];
         add_shared(c.voxels, part.voxels);
         lower_shared(c.min.x, part.min.x);
         lower_shared(c.min.y, part.min.y);
@@ -95,7 +96,7 @@ struct start_components {
     component_list list;
     glm::ivec3 extent;
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        component* to = list.components + list.before[i];
+        voxel_component* to = list.components + list.before[i];
         for (std::uint32_t left = list.marks[i]; left != 0; left &= left - 1)
             *to++ = {static_cast<std::int64_t>(32 * i) + exact::lowest_one(left), 0, extent, glm::ivec3(-1)};
     }
@@ -123,7 +124,7 @@ public:
         return backend.sum(counts, before_);
     }
     // A list of components without voxels, in memory for as many as number() has returned.
-    [[nodiscard]] component_list start(Backend& backend, component* components, const glm::ivec3& extent) {
+    [[nodiscard]] component_list start(Backend& backend, voxel_component* components, const glm::ivec3& extent) {
         const component_list list{marks_.data(), before_.data(), components};
         backend.for_each(words_, passes::start_components{list, extent});
         return list;

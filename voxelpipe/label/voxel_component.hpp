@@ -11,12 +11,12 @@
 namespace voxelpipe {
 
 // The voxel (i, j, k) of a grid of nx * ny * nz has the number i + nx * (j + ny * k).
-struct component {
+struct voxel_component {
     std::int64_t name;    // the lowest number of its voxels, which is their label
     std::uint64_t voxels; // 1 or more
     glm::ivec3 min;       // lowest voxel of its bounding box
     glm::ivec3 max;       // highest voxel of its bounding box, which belongs to the box
-    friend bool operator==(const component&, const component&) = default;
+    friend bool operator==(const voxel_component&, const voxel_component&) = default;
 };
 
 } // namespace voxelpipe
