@@ -79,7 +79,8 @@ public:
     // roots are marked.
     std::uint64_t flatten(std::uint64_t row, std::uint32_t* marks) const {
         std::uint64_t count = 0;
-        const auto [y, z] = place(row);
+        const row_place at = place(row);
+        const int y = at.y, z = at.z;
         const core::bit_row<word> of = rows_.row(y, z);
         number first = rows_.first_voxel(y, z), root = 0;
         word before = 0;
@@ -108,7 +109,8 @@ public:
     // segment.
     template <class OnSegment>
     void write(std::uint64_t row, const OnSegment& on_segment) const {
-        const auto [y, z] = place(row);
+        const row_place at = place(row);
+        const int y = at.y, z = at.z;
         const core::bit_row<word> of = rows_.row(y, z);
         number* to = labels_ + rows_.first_voxel(y, z);
         for (int i = 0; i < rows_.row_words(); ++i, to += bits) {
@@ -120,7 +122,10 @@ public:
     }
 
 private:
-    [[nodiscard]] std::pair<int, int> place(std::uint64_t row) const {
+    struct row_place {
+        int y, z;
+    };
+    [[nodiscard]] row_place place(std::uint64_t row) const {
         const auto ny = static_cast<std::uint64_t>(rows_.extent.y);
         return {static_cast<int>(row % ny), static_cast<int>(row / ny)};
     }
@@ -139,7 +144,8 @@ private:
     // Alone: starts the segments, and no other thread has the sets of the rows that are wanted.
     template <bool Alone, class IsWanted>
     void join_row(std::uint64_t row, const IsWanted& is_wanted) const {
-        const auto [y, z] = place(row);
+        const row_place at = place(row);
+        const int y = at.y, z = at.z;
         const std::uint64_t ny = static_cast<std::uint64_t>(rows_.extent.y);
         const bool has_edges = connectivity_ >= 18;
         const core::near_rows wanted{y > 0 && is_wanted(row - 1), z > 0 && is_wanted(row - ny),

@@ -33,6 +33,7 @@ CPP = {
     "distances": ("Distances", "Signed distances from meshes, and the nearest triangle.",
                   ["distance/distance.hpp", "distance/sparse_distance.hpp", "distance/distance_ray.hpp",
                    "distance/core/point_triangle.hpp", "distance/core/row_crossing.hpp"]),
+    "label": ("Labels", "Connected components of bits.", ["label/label.hpp", "label/voxel_component.hpp"]),
     "cells": ("Cut cells", "How much of each voxel is inside.", ["cells/cells.hpp"]),
     "sparse": ("Sparse grids", "Memory in proportion to the voxels that are drawn: bricks, octrees, files.",
                ["sparse/sparse.hpp", "sparse/host_sparse.hpp", "sparse/sparse_merge.hpp", "core/brick_table.hpp", "core/brick_tile.hpp", "sparse/brick_lookup.hpp", "sparse/octree.hpp", "core/octree_view.hpp",

@@ -36,6 +36,8 @@ void add_solids(case_table<Backend>& cases);
 template <class Backend>
 void add_cells(case_table<Backend>& cases);
 template <class Backend>
+void add_labels(case_table<Backend>& cases);
+template <class Backend>
 void add_targets(case_table<Backend>& cases);
 template <class Backend>
 void add_integer_targets(case_table<Backend>& cases);
@@ -56,6 +58,7 @@ case_table<Backend> all_cases() {
     add_coverages(cases);
     add_solids(cases);
     add_cells(cases);
+    add_labels(cases);
     add_targets(cases);
     add_integer_targets(cases);
     add_lists(cases);

@@ -6,6 +6,7 @@
 
 #include "cells.hpp"
 #include "coverages.hpp"
+#include "labels.hpp"
 #include "levels.hpp"
 #include "lists.hpp"
 #include "main.hpp"
@@ -17,6 +18,7 @@
 
 #include <voxelpipe/cells/device/cells.cuh>
 #include <voxelpipe/device/backend.cuh>
+#include <voxelpipe/label/device/label.cuh>
 
 #include <cuda_runtime.h>
 

@@ -111,7 +111,7 @@ class component_marks {
     using buffer = typename Backend::template buffer<T>;
 
 public:
-    // For a grid of so many voxels. Without any mark.
+    // voxels: number of voxels of the grid. Nothing is marked.
     component_marks(Backend& backend, std::uint64_t voxels)
         : words_((voxels + 31) / 32), marks_(backend, words_), before_(backend, words_ + 1) {
         backend.for_each(words_, passes::clear_marks{marks_.data()});
