@@ -81,7 +81,7 @@ TASKS = [
 ]
 # Shown nowhere: what the library uses to write NanoVDB files.
 HIDDEN = ["sparse/io/nanovdb_nodes.hpp"]
-PYTHON = ["Grid", "fit", "load_model", "Model", "Material", "Texture", "Part", "voxelize", "solid", "tiles", "distance", "distance_at", "fractions", "remesh", "extract",
+PYTHON = ["Grid", "fit", "load_model", "Model", "Material", "Texture", "Part", "voxelize", "solid", "tiles", "distance", "distance_at", "fractions", "label", "remesh", "extract",
           "bake", "sparse", "dense", "VoxelList", "lines", "points", "instances", "Octree", "Hits", "fragments", "Fragments", "save", "formats", "render", "view", "View",
           "DroppedTrianglesWarning", "OpenMeshWarning", "ModelWarning", "WriteError"]
 
