@@ -9,6 +9,7 @@
 #include <cpu_ref/distance/distance_at.hpp>
 #include <cpu_ref/distance/sparse_distance.hpp>
 #include <cpu_ref/distance/voxelize_distance.hpp>
+#include <cpu_ref/label/label.hpp>
 #include <cpu_ref/solid/voxelize_solid.hpp>
 #include <cpu_ref/sparse/voxelize_sparse.hpp>
 #include <voxelpipe/voxelpipe.hpp>

@@ -12,6 +12,7 @@ The library's parts, from the top down; an include names a file of the same part
     distance
     sparse
     solid
+    label
     levels
     voxelize.hpp and the other headers directly in voxelpipe/ (but voxelpipe.hpp, which includes all), and device/
     core, tuning
@@ -27,8 +28,8 @@ Inside voxelpipe/device/ an include names a file of the same folder or of a fold
     scene
     base
 
-Outside a device/ folder only voxelpipe.hpp and .cuh files include one. cpu_ref/ mirrors the modules: cpu_ref/solid,
-cpu_ref/sparse, cpu_ref/distance and cpu_ref/cells stand above its other files, and cpu_ref/backend.hpp includes all. It includes no device/. No include cycle
+Outside a device/ folder only voxelpipe.hpp and .cuh files include one. cpu_ref/ mirrors the modules: cpu_ref/label,
+cpu_ref/solid, cpu_ref/sparse, cpu_ref/distance and cpu_ref/cells stand above its other files, and cpu_ref/backend.hpp includes all. It includes no device/. No include cycle
 anywhere. At most four files lie directly in device/. Forwarding headers are left out.
 
 The tool's folders, from the top down; tool/ itself has main.cpp, which may include all of them:
@@ -48,7 +49,7 @@ import re
 import sys
 
 LAYERS = ["", "call", "tiles fragments", "raster", "targets", "scene", "base"]  # of device/, from the top down
-MODULES = ["slabs", "cells", "programs", "surfaces", "distance", "sparse", "solid", "levels", "api", "core"]  # of voxelpipe/, from the top down
+MODULES = ["slabs", "cells", "programs", "surfaces", "distance", "sparse", "solid", "label", "levels", "api", "core"]  # of voxelpipe/, from the top down
 MAX_LOOSE = 4  # files directly in device/: what a reader meets first
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in (folders.split() or [""])}
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)
@@ -85,7 +86,7 @@ def complaint(source, target):
     if to_device and (part == "cpu_ref" or source.endswith(".hpp") and "device" not in (part, folder)):
         return f"{source} may not include a device/ folder"
     if part == "cpu_ref":
-        order = ["cells", "distance", "sparse", "solid", ""]
+        order = ["cells", "distance", "sparse", "solid", "label", ""]
         if to_part == "cpu_ref" and order.index(to_folder) < order.index(folder):
             return f"cpu_ref/{folder} may not include cpu_ref/{to_folder}: includes run downward"
         return None

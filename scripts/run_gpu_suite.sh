@@ -228,7 +228,7 @@ for part in "${parts[@]}"; do
         sanitized_solids+=':Solids.VotesOf*:Solids.SlabsOfA*:Solids.ClosedHoles:DeviceRepairs.HolesAndVotes:DeviceRepairs.ListsAndSparseResults'
         sanitized_distance='DeviceDistance.WholeFields:DeviceDistance.LongLists*:DeviceDistance.Sparse*:DeviceDistance.Points*:*WithoutTriangles'
         sanitized=(small_loads small_lists counting_sort fragment_order fragment_sort immediate immediate_bits kept_graphs tracked_changes
-            sparse solids distance surfaces cut_cells devices)
+            sparse solids distance surfaces cut_cells label devices)
         target="$(printf 'device_%s_test ' "${sanitized[@]}")" build_suite gpu
         end_programs
         for tool in memcheck racecheck initcheck synccheck; do

@@ -41,6 +41,8 @@ enum class status_code : std::uint8_t {
     bad_cell_options,     // an option of voxelize_cells is out of its range
     winding_too_large,    // voxelize_cells: the covers of a row's pixels may sum to more than 2^18 pixels
     crop_without_whole,   // repair::exterior of a crop: what lies outside follows from the whole grid
+    bad_label_options,    // label: a connectivity other than 6, 18 and 26
+    too_many_voxels,      // label: a grid with more voxels than labels of that type can number
     no_device,            // cuda_backend without a usable device
     device_error,         // `device_error` holds the CUDA error
 };
@@ -158,6 +160,12 @@ struct cell_counters {
     friend bool operator==(const cell_counters&, const cell_counters&) = default;
 };
 
+// What label counts; zeros from other calls.
+struct label_counters {
+    std::uint64_t components = 0; // connected components of the voxels that are set
+    friend bool operator==(const label_counters&, const label_counters&) = default;
+};
+
 // Sizes that a caller's workspace or limits must have; set if `code` is capacity_exceeded.
 struct required_sizes {
     std::uint64_t tile_pairs = 0;         // as workspace_limits
@@ -225,6 +233,10 @@ struct required_sizes {
     case status_code::crop_without_whole:
         return "crop without whole: the exterior of a part of a mesh follows from all of it, draw a grid that holds "
                "that";
+    case status_code::bad_label_options:
+        return "bad label options: the connectivity must be 6, 18 or 26";
+    case status_code::too_many_voxels:
+        return "too many voxels: more than labels of this type can number; take std::int64_t";
     case status_code::no_device:
         return "no usable device";
     case status_code::device_error:
@@ -267,6 +279,7 @@ struct [[nodiscard]] status {
     distance_counters distance{};                               // of voxelize_distance and distance_at
     surface_counters surface{};                                 // of extract and remesh
     cell_counters cells{};                                      // of voxelize_cells
+    label_counters label{};                                     // of label
     required_sizes required{};                                  // if the capacity did not suffice
     static constexpr std::uint32_t unknown = ~std::uint32_t{0}; // no draw or triangle is named
     std::uint32_t draw = unknown; // of index_out_of_range: the first such triangle and its draw, if voxelize returns

@@ -15,6 +15,7 @@
 #include <voxelpipe/distance/sparse_distance.hpp>
 #include <voxelpipe/framebuffer.hpp>
 #include <voxelpipe/grid.hpp>
+#include <voxelpipe/label/label.hpp>
 #include <voxelpipe/mesh.hpp>
 #include <voxelpipe/programs/element_call.hpp>
 #include <voxelpipe/programs/elements.hpp>

@@ -33,6 +33,7 @@ CPP = {
     "distances": ("Distances", "Signed distances from meshes, and the nearest triangle.",
                   ["distance/distance.hpp", "distance/sparse_distance.hpp", "distance/distance_ray.hpp",
                    "distance/core/point_triangle.hpp", "distance/core/row_crossing.hpp"]),
+    "label": ("Labels", "Connected components of bits.", ["label/label.hpp", "label/voxel_component.hpp"]),
     "cells": ("Cut cells", "How much of each voxel is inside.", ["cells/cells.hpp"]),
     "sparse": ("Sparse grids", "Memory in proportion to the voxels that are drawn: bricks, octrees, files.",
                ["sparse/sparse.hpp", "sparse/host_sparse.hpp", "sparse/sparse_merge.hpp", "core/brick_table.hpp", "core/brick_tile.hpp", "sparse/brick_lookup.hpp", "sparse/octree.hpp", "core/octree_view.hpp",
@@ -80,7 +81,7 @@ TASKS = [
 ]
 # Shown nowhere: what the library uses to write NanoVDB files.
 HIDDEN = ["sparse/io/nanovdb_nodes.hpp"]
-PYTHON = ["Grid", "fit", "load_model", "Model", "Material", "Texture", "Part", "voxelize", "solid", "tiles", "distance", "distance_at", "fractions", "remesh", "extract",
+PYTHON = ["Grid", "fit", "load_model", "Model", "Material", "Texture", "Part", "voxelize", "solid", "tiles", "distance", "distance_at", "fractions", "label", "remesh", "extract",
           "bake", "sparse", "dense", "VoxelList", "lines", "points", "instances", "Octree", "Hits", "fragments", "Fragments", "save", "formats", "render", "view", "View",
           "DroppedTrianglesWarning", "OpenMeshWarning", "ModelWarning", "WriteError"]
 

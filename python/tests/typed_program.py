@@ -20,13 +20,14 @@ def occupied(vertices: Array, triangles: npt.NDArray[np.int64]) -> int:
     lists: vp.Fragments = vp.fragments(mesh, grid)
     field: npt.NDArray[np.float32] = vp.distance(mesh, grid, "whole", corners=True)
     parts: npt.NDArray[np.float32] = vp.fractions(mesh, grid)
+    labels, components = vp.label(parts > 0, 26, components=True)
     baked: dict[str, npt.NDArray[np.uint8]] = vp.bake("lighthouse.glb", grid)
     model: vp.Model = vp.load_model("lighthouse.glb")
     voxels, attributes = vp.sparse(model, grid, ["color", "normal"], solid="nonzero", extent="center")
     listed: vp.VoxelList = voxels
     surface[grid.zyx(listed)] = True
     vp.save("a.vox", (voxels, attributes), grid, up="z", merge=True)
-    del words, picture, lists, field, parts, baked
+    del words, picture, lists, field, parts, labels, components, baked
     return shape[0]
 
 

@@ -26,6 +26,7 @@ from ._core import Grid
 from ._distance import distance, distance_at
 from ._fit import fit
 from ._fractions import fractions
+from ._label import label
 from ._model import Material, Model, ModelWarning, Part, Texture, load_model
 from ._octree import Hits, Octree
 from ._remesh import extract, remesh
@@ -65,6 +66,7 @@ __all__ = [
     "fractions",
     "fragments",
     "instances",
+    "label",
     "lines",
     "load_model",
     "points",

@@ -40,6 +40,8 @@ void add_distances(case_table<Backend>& cases);
 template <class Backend>
 void add_surfaces(case_table<Backend>& cases);
 template <class Backend>
+void add_labels(case_table<Backend>& cases);
+template <class Backend>
 void add_targets(case_table<Backend>& cases);
 template <class Backend>
 void add_integer_targets(case_table<Backend>& cases);
@@ -62,6 +64,7 @@ case_table<Backend> all_cases() {
     add_cells(cases);
     add_distances(cases);
     add_surfaces(cases);
+    add_labels(cases);
     add_targets(cases);
     add_integer_targets(cases);
     add_lists(cases);

@@ -7,6 +7,7 @@
 #include "cells.hpp"
 #include "coverages.hpp"
 #include "distances.hpp"
+#include "labels.hpp"
 #include "levels.hpp"
 #include "lists.hpp"
 #include "main.hpp"
@@ -20,6 +21,7 @@
 #include <voxelpipe/cells/device/cells.cuh>
 #include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/distance/device/distance.cuh>
+#include <voxelpipe/label/device/label.cuh>
 #include <voxelpipe/surfaces/device/surfaces.cuh>
 
 #include <cuda_runtime.h>

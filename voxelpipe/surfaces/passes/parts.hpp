@@ -4,49 +4,18 @@
 
 // Components of a surface, and leaving parts of it out: functors for a backend's for_each.
 
+#include <voxelpipe/core/disjoint_sets.hpp>
 #include <voxelpipe/core/shared_counter.hpp>
 #include <voxelpipe/surfaces/surface.hpp>
 
 #include <glm/vec4.hpp>
 
-#include <atomic>
 #include <cstdint>
 
 namespace voxelpipe::core::passes {
 
-// parent[i] from `from` to `to`, if it is still that. Returns what it was.
-VOXELPIPE_HD inline std::uint32_t exchange_parent(std::uint32_t& parent, std::uint32_t from, std::uint32_t to) {
-#if defined(__CUDA_ARCH__)
-    return atomicCAS(&parent, from, to);
-#else
-    std::atomic_ref(parent).compare_exchange_strong(from, to, std::memory_order_relaxed);
-    return from;
-#endif
-}
-
-// Union-find: the root of a set is its lowest number, whatever order threads join in.
-struct vertex_sets {
-    std::uint32_t* parents;
-
-    [[nodiscard]] VOXELPIPE_HD std::uint32_t root(std::uint32_t v) const {
-        for (;;) {
-            const std::uint32_t up = load_shared(parents[v]);
-            if (up == v) return v;
-            const std::uint32_t next = load_shared(parents[up]);
-            if (next != up) exchange_parent(parents[v], up, next); // halves the path
-            v = next;
-        }
-    }
-    VOXELPIPE_HD void join(std::uint32_t a, std::uint32_t b) const {
-        for (;;) {
-            a = root(a);
-            b = root(b);
-            if (a == b) return;
-            const std::uint32_t high = a > b ? a : b, low = a > b ? b : a;
-            if (exchange_parent(parents[high], high, low) == high) return;
-        }
-    }
-};
+// Sets of vertices.
+using vertex_sets = disjoint_sets<std::uint32_t>;
 
 // Each vertex by itself, and marked as left out.
 struct start_vertices {
