@@ -38,6 +38,13 @@ true = (-node[:, 0] - np.sqrt(9 - node[:, 1] ** 2 - node[:, 2] ** 2)) / 0.25
 steep = np.abs(node[:, 1:]).max(axis=1) < 1.5
 assert len(q[cut]) > 300 and np.abs(q[cut] - true)[steep].max() < 0.04, np.abs(q[cut] - true)[steep].max()
 
+# snippet: outside
+labels = vp.label(~is_wall)  # what walls part has other names
+is_outside = labels == labels[0, 0, 0]  # without cavities in the body, which no flow reaches
+# end snippet
+
+assert np.array_equal(is_outside, ~is_wall)  # this body has none
+
 # snippet: densities
 materials = {"lead": 11.35, "polyethylene": 0.94}  # g/cm³
 bodies = [ball((-1.5, 0, 0), 1.2), ball((1.25, 0, 0), 1.55)]
