@@ -184,33 +184,29 @@ private:
         return run;
     }
 
+    // Values are written four at a time, and those too many are overwritten by what follows: runs and gaps of up to
+    // four voxels take no branch. In an array of its own, because the words behind still hold parents.
     template <class OnSegment>
     static void write_word(word now, number* to, int count, const OnSegment& on_segment) {
         constexpr auto none = static_cast<number>(no_label);
-        const word starts = core::segment_starts(now);
-        if (now == 0) {
-            std::fill_n(to, count, none);
-            return;
-        }
-        std::array<number, bits / 2 + 1> roots; // of segments from 1 on
-        roots[0] = none;
-        unsigned segments = 0;
-        for (word left = starts; left != 0; left &= left - 1) {
+        std::array<number, bits + 4> out;
+        const auto fill = [&](int first, int end, number value) {
+            for (auto i = static_cast<unsigned>(first); i < static_cast<unsigned>(end); i += 4)
+                out[i] = out[i + 1] = out[i + 2] = out[i + 3] = value;
+        };
+        int end = 0; // of the last segment
+        for (word left = now; left != 0;) {
             const int x = exact::lowest_one(left);
             const word gaps = ~(now >> x);
             const int length = gaps == 0 ? bits : exact::lowest_one(gaps);
-            roots[++segments] = to[x];
+            fill(end, x, none);
+            end = x + length;
+            fill(x, end, to[x]);
             on_segment(to[x], x, length);
+            left = end == bits ? 0 : left >> end << end;
         }
-        if (~now == 0) {
-            std::fill_n(to, count, roots[1]);
-            return;
-        }
-        unsigned segment = 0;
-        for (int x = 0; x < count; ++x) {
-            segment += static_cast<unsigned>(starts >> x & 1);
-            to[x] = roots[(now >> x & 1) != 0 ? segment : 0];
-        }
+        fill(end, count, none);
+        std::copy_n(out.data(), count, to);
     }
 
     core::bit_rows_of<word, number> rows_;

@@ -5,9 +5,8 @@
 
 #include "../label/label_support.hpp"
 
-#include <cpu_ref/backend.hpp>
+#include <cpu_ref/label/label.hpp>
 #include <voxelpipe/label/device/label.cuh>
-#include <voxelpipe/voxelpipe.hpp>
 
 #include <gtest/gtest.h>
 

@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Labels and lists of components: of random bits by each connectivity, and of what a mesh touches.
+// Labels and lists of components of random bits: by each connectivity, and of 64 bits, of tiled bits.
 
 #include "cases.hpp"
+
+#include <utility>
 
 namespace golden {
 
@@ -27,34 +29,31 @@ void add_labels_of(Backend& backend, digest& d, const vp::target_view<Target>& b
     d.add(numbers);
 }
 
+// percent: the share of the bits that are set.
+template <class Layout, class Label, class Backend>
+void random_labels(Backend& backend, digest& d, const glm::ivec3& extent, std::uint32_t percent, int connectivity) {
+    using bits = vp::target<vp::bit, vp::blend::bit_or, Layout>;
+    std::vector<std::uint32_t> words(bits::map::elements(extent));
+    std::uint32_t n = 0;
+    for (int z = 0; z < extent.z; ++z)
+        for (int y = 0; y < extent.y; ++y)
+            for (int x = 0; x < extent.x; ++x)
+                bits::map::store(words.data(), extent, x, y, z, mixed(n++, 60) % 100 < percent);
+    typename Backend::template buffer<std::uint32_t> memory(backend, vp::array_view<const std::uint32_t>(words));
+    add_labels_of<Label>(backend, d, vp::target_view<bits>{memory.data(), extent}, connectivity);
+}
+
 template <class Backend>
 void add_labels(case_table<Backend>& cases) {
-    using bits = vp::target<vp::bit, vp::blend::bit_or>;
-    for (const int connectivity : {6, 18, 26})
+    // Near the share at which a component reaches through the grid.
+    for (const auto& [connectivity, percent] : {std::pair{6, 31u}, std::pair{18, 14u}, std::pair{26, 10u}})
         cases.push_back(
-            {"label." + std::to_string(connectivity) + ".random", [=](Backend& backend, digest& d) {
-                 // Near the share at which a component reaches through the grid.
-                 const glm::ivec3 extent(97, 45, 38);
-                 const std::uint32_t percent = connectivity == 6 ? 31 : connectivity == 18 ? 14 : 10;
-                 std::vector<std::uint32_t> words(bits::map::elements(extent));
-                 std::uint32_t n = 0;
-                 for (int z = 0; z < extent.z; ++z)
-                     for (int y = 0; y < extent.y; ++y)
-                         for (int x = 0; x < extent.x; ++x)
-                             bits::map::store(words.data(), extent, x, y, z, mixed(n++, 60) % 100 < percent);
-                 typename Backend::template buffer<std::uint32_t> memory(backend,
-                                                                         vp::array_view<const std::uint32_t>(words));
-                 add_labels_of<std::int32_t>(backend, d, vp::target_view<bits>{memory.data(), extent}, connectivity);
+            {"label." + std::to_string(connectivity) + ".random",
+             [connectivity = connectivity, percent = percent](Backend& backend, digest& d) {
+                 random_labels<vp::layout::linear, std::int32_t>(backend, d, {97, 45, 38}, percent, connectivity);
              }});
-    cases.push_back({"label.26.soup", [](Backend& backend, digest& d) {
-                         using tiled_bits = vp::target<vp::bit, vp::blend::bit_or, vp::layout::tiled>;
-                         const vp::grid g = odd_grid();
-                         vp::framebuffer<Backend, tiled_bits> drawn{backend, g.extent};
-                         const auto mesh = upload(backend, hashed_mesh("soup"));
-                         const vp::status s =
-                             vp::voxelize(backend, mesh, g, vp::passthrough{}, vp::constant(true), drawn);
-                         add_counts(d, s);
-                         add_labels_of<std::int64_t>(backend, d, vp::get<0>(drawn).view(), 26);
+    cases.push_back({"label.6.tiled", [](Backend& backend, digest& d) {
+                         random_labels<vp::layout::tiled, std::int64_t>(backend, d, {65, 31, 20}, 45, 6);
                      }});
 }
 
