@@ -8,8 +8,13 @@
 #include "mesh_parts.hpp"
 #include "model/parallel.hpp"
 
+#include <array>
 #include <charconv>
+#include <span>
+#include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace voxelize {
 namespace {
@@ -22,6 +27,25 @@ constexpr std::array<std::string_view, 6> face_names{"S6", "S4", "S3", "S5", "S1
 void append_number(std::string& text, std::uint64_t number) {
     std::array<char, 24> digits{};
     text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr);
+}
+
+// World coordinates of the lattice planes along an axis, of at most 20 characters, which is what Abaqus reads of one.
+std::vector<std::string> short_coordinates(const voxel_shape& v, std::size_t axis) {
+    constexpr std::size_t most_characters = 20;
+    constexpr int decimals = 12; // beside a sign, a digit, a point and an exponent of five
+    std::vector<std::string> texts;
+    for (std::int64_t n = 0; n <= v.extent[axis]; ++n) {
+        const double value = world(v, axis, static_cast<double>(n));
+        std::string text = number(value);
+        if (text.size() > most_characters) {
+            std::array<char, 32> digits{};
+            text.assign(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value,
+                                                     std::chars_format::scientific, decimals)
+                                           .ptr);
+        }
+        texts.push_back(std::move(text));
+    }
+    return texts;
 }
 
 // Numbers from 1 in lines of 16, the most that a line may have.
@@ -41,15 +65,17 @@ public:
           meter_(options.progress, mesh.num_parts() * (2 + (has_materials() ? sets_.all().size() : 0) + 12)) {}
 
     void write() {
-        const coordinate_texts places(mesh_.shape(), 0, 1);
+        const std::array<std::vector<std::string>, 3> places{short_coordinates(mesh_.shape(), 0),
+                                                             short_coordinates(mesh_.shape(), 1),
+                                                             short_coordinates(mesh_.shape(), 2)};
         out_.write("*HEADING\nmade by voxelize\n*NODE, NSET=NODES\n");
         parts([&](std::size_t part) {
             std::string text;
             std::uint64_t number = mesh_.first_node(part);
             mesh_.for_each_node(part, [&](std::size_t x, std::size_t y, std::size_t z) {
                 append_number(text, ++number);
-                text.append(", ").append(places.of_axis[0][x]).append(", ").append(places.of_axis[1][y]);
-                text.append(", ").append(places.of_axis[2][z]).append("\n");
+                text.append(", ").append(places[0][x]).append(", ").append(places[1][y]);
+                text.append(", ").append(places[2][z]).append("\n");
             });
             return text;
         });

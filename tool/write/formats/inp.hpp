@@ -3,7 +3,8 @@
 #pragma once
 
 // Abaqus' input file (.inp), which CalculiX and others read: the occupied voxels as elements C3D8 (hexahedra.hpp),
-// numbered from 1, as text. Coordinates are decimals that read back to the same doubles.
+// numbered from 1, as text. Coordinates are decimals that read back to the same doubles, or, where these have more than
+// the 20 characters that Abaqus reads, 13 digits.
 //
 // Sets: NODES and VOXELS have everything. Where there are numbers of materials, MATERIAL_n has the elements of each,
 // and NO_MATERIAL those without. For the sides that no other voxel covers, NODES_X_NEGATIVE to NODES_Z_POSITIVE are

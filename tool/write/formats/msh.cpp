@@ -8,7 +8,10 @@
 #include "mesh_parts.hpp"
 #include "write_items.hpp"
 
+#include <array>
 #include <limits>
+#include <string>
+#include <vector>
 
 namespace voxelize {
 namespace {
