@@ -102,10 +102,10 @@ program=$(find_program "${program:-$build/tests/golden/golden_hashes$suffix}")
 tool_cases() {
     local format coverage target solid fill
     # Every format, of colours where it shows them; and of several values where it holds them.
-    for format in npy npz vox schem litematic binvox vti nrrd zarr glb obj ply stl 3mf xyz html nvdb; do
+    for format in npy npz vox schem litematic binvox vti nrrd zarr glb obj ply stl 3mf xyz html nvdb vtu inp msh; do
         printf 'file.%s model.glb out.%s -r 40\n' "$format" "$format"
     done
-    for format in npy npz vti nrrd zarr html nvdb; do
+    for format in npy npz vti nrrd zarr html nvdb vtu; do
         printf 'file.%s.values model.glb out.%s -r 28 -t occupancy,count,color,normal,material,depth\n' "$format" "$format"
     done
     printf 'file.pvti model.glb out.pvti -r 40 --pieces 3 -t count,normal\n'
@@ -113,6 +113,10 @@ tool_cases() {
     printf 'file.zarr.levels model.glb out.zarr -r 36 --levels -t occupancy,color\n'
     printf 'file.npz.sparse model.glb out.npz -r 40 --sparse -t color,triangle\n'
     printf 'file.npy.sparse model.glb out.npy -r 40 --sparse\n'
+    for format in inp msh; do
+        printf 'file.%s.materials model.glb out.%s -r 28 --solid nonzero -t material\n' "$format" "$format"
+    done
+    printf 'file.vtu.threshold model.glb out.vtu -r 28 -t fraction --threshold 0.5\n'
     printf 'file.ply.points model.glb out.ply -r 40 --points\n'
     for format in glb obj ply stl 3mf; do printf 'file.%s.merge model.glb out.%s -r 40 --merge\n' "$format" "$format"; done
     # Without an angle, so that the picture takes no sine, which differs between machines.

@@ -192,13 +192,14 @@ nb::tuple write_list(const nb::handle& write_error, const std::string& path, con
                    [&](const voxelize::write_options& options) { return voxelize::write_sparse(v, path, options); });
 }
 
-// (extension, description, needs the occupancy, holds all channels, shows colours, needs cubes, occupied voxels alone)
+// (extension, description, needs the occupancy, holds all channels, shows colours, needs cubes, occupied voxels alone,
+// holds materials)
 nb::list formats() {
     nb::list all;
     for (const voxelize::format& f : voxelize::formats())
         all.append(nb::make_tuple(nb::str(f.extension.data(), f.extension.size()),
                                   nb::str(f.description.data(), f.description.size()), f.needs_occupancy,
-                                  f.all_channels, f.shows_colors, f.needs_cubes, f.only_sparse));
+                                  f.all_channels, f.shows_colors, f.needs_cubes, f.only_sparse, f.has_materials));
     return all;
 }
 

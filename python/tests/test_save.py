@@ -150,7 +150,7 @@ def test_every_format_of_the_tool_is_written(scene, tmp_path):
         for name, what in (("dense", values), ("list", listed)):
             files = vp.save(tmp_path / f"{name}{extension}", what, grid)
             assert files and all((tmp_path / f).exists() for f in files), extension
-    for extension in (".vox", ".schem", ".binvox", ".glb", ".obj", ".ply", ".stl", ".xyz", ".nvdb"):
+    for extension in (".vox", ".schem", ".binvox", ".glb", ".obj", ".ply", ".stl", ".xyz", ".nvdb", ".vtu", ".inp", ".msh"):
         assert (tmp_path / f"dense{extension}").read_bytes() == (tmp_path / f"list{extension}").read_bytes(), extension
     rows = np.loadtxt(tmp_path / "dense.xyz")
     assert len(rows) == surface.sum()
@@ -159,6 +159,15 @@ def test_every_format_of_the_tool_is_written(scene, tmp_path):
     vp.save(tmp_path / "plain.ply", surface, grid)
     vp.save(tmp_path / "merged.ply", surface, grid, merge=True)
     assert (tmp_path / "merged.ply").stat().st_size < (tmp_path / "plain.ply").stat().st_size
+
+
+def test_hexahedra_have_sets_of_materials(scene, tmp_path):
+    _, grid, surface, _ = scene
+    material = np.where(surface, np.arange(grid.shape[2]) % 2, -1)
+    vp.save(tmp_path / "a.inp", {"material": material}, grid, occupied=surface)
+    text = (tmp_path / "a.inp").read_text()
+    sets = [text.partition(f"*ELSET, ELSET=MATERIAL_{n}\n")[2].partition("*")[0].replace(",", " ").split() for n in (0, 1)]
+    assert [len(s) for s in sets] == [np.count_nonzero(material == n) for n in (0, 1)] and "NO_MATERIAL" not in text
 
 
 def test_tools_formats_say_what_they_do_not_hold(scene, tmp_path):

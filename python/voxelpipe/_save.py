@@ -31,7 +31,7 @@ class WriteError(OSError, ValueError):
 class _Format:
     """A row of the tool's table of formats."""
 
-    def __init__(self, row: tuple[str, str, bool, bool, bool, bool, bool]) -> None:
+    def __init__(self, row: tuple[str, str, bool, bool, bool, bool, bool, bool]) -> None:
         (
             self.extension,
             self.description,
@@ -40,6 +40,7 @@ class _Format:
             self.shows_colors,
             self.needs_cubes,
             self.only_sparse,
+            self.has_materials,
         ) = row
 
 
@@ -147,6 +148,8 @@ def _channels(f: _Format, arrays: Mapping[str, np.ndarray], axes: int) -> list[t
     rest = {name: a for name, a in arrays.items() if not (name == "occupancy" and a.dtype == np.bool_)}
     if f.all_channels:
         return [(name, _held(f.extension, name, a)) for name, a in rest.items()]
+    if f.has_materials:
+        return [(name, np.ascontiguousarray(a, np.int32)) for name, a in rest.items() if name == "material" and a.ndim == axes]
     colors = next((a for a in rest.values() if a.ndim == axes + 1 and a.shape[-1] in (3, 4)), None)
     return [("color", np.ascontiguousarray(_as_colors(colors)))] if f.shows_colors and colors is not None else []
 
@@ -279,14 +282,15 @@ def save(
     16 bits, uint8 and uint16 as they are. .npy: one array, as it is. .npz: the arrays by name, with origin and voxel_size. .nvdb (NanoVDB): the occupied voxels
     with their values, a grid for each name. .png: a picture, see render(). .html: a page, see view(). .vti, .pvti, .nrrd and
     .zarr: all arrays. .vox, .schem, .litematic, .binvox, .glb, .obj, .ply, .stl, .3mf, .xyz: the occupied voxels, with the
-    first array of colours where the format has any.
+    first array of colours where the format has any. .vtu, .inp, .msh: a hexahedron for each occupied voxel, with all arrays
+    (.vtu) or with sets by the numbers of the array "material"; occupied=fractions >= 0.5 makes them of fractions.
 
     Args:
         path: the file. Formats with one array a file write "a.NAME.nrrd" and so on for several.
         values: an array, a dict of arrays, or what sparse() returned.
         grid: the Grid of the values.
         occupied: bool (nz, ny, nx); by default the voxels whose value is not zero.
-        compression: zlib level of .vti, .nrrd, .zarr, .3mf, .schem and .litematic, 0 to 9.
+        compression: zlib level of .vti, .vtu, .nrrd, .zarr, .3mf, .schem and .litematic, 0 to 9.
         merge: .ply, .obj, .glb, .stl, .3mf: coplanar faces of equal colour become one rectangle.
         points: .ply holds the voxels' centres.
         levels: .zarr holds mip levels, too.

@@ -233,6 +233,62 @@ TEST(Fraction, EveryFormatOfValuesHoldsIt) {
     EXPECT_EQ(0, result.code) << result.err;
 }
 
+std::size_t cells_of(const std::string& vtu) {
+    const std::string before = "NumberOfCells=\"";
+    const std::size_t at = vtu.find(before);
+    return at == std::string::npos ? SIZE_MAX : std::stoul(vtu.substr(at + before.size()));
+}
+
+TEST(Fraction, ThresholdChoosesTheHexahedra) {
+    const scratch_folder folder;
+    builder file;
+    add(file, tilted);
+    const std::vector<float> fractions = library_fractions({tilted}, grid_of_16());
+    std::vector<std::size_t> counts;
+    for (const std::string threshold : {"1e-6", "0.5", "1"}) {
+        // What another output asks for changes nothing here.
+        const outcome result =
+            draw(folder, file, "o.vtu", {"-t", "fraction", "--threshold", threshold, "-o", folder / "o.binvox"});
+        ASSERT_EQ(0, result.code) << result.err;
+        const std::string text = read_file(folder / "o.vtu");
+        counts.push_back(static_cast<std::size_t>(
+            std::count_if(fractions.begin(), fractions.end(), [&](float f) { return f >= std::stof(threshold); })));
+        EXPECT_EQ(counts.back(), cells_of(text)) << threshold;
+        EXPECT_NE(std::string::npos, text.find("Name=\"fraction\""));
+        EXPECT_EQ(std::string::npos, text.find("Name=\"occupancy\""));
+    }
+    EXPECT_TRUE(counts[0] > counts[1] && counts[1] > counts[2] && counts[2] > 0);
+    for (const char* const output : {"o.inp", "o.msh"}) {
+        const outcome result = draw(folder, file, output, {"-t", "fraction", "--threshold", "0.5"});
+        EXPECT_EQ(0, result.code) << result.err;
+        EXPECT_EQ(std::string::npos, result.err.find("warning")) << result.err;
+    }
+    const std::string text = read_file(folder / "o.inp");
+    EXPECT_NE(std::string::npos, text.find("\n" + std::to_string(counts[1]) + ", "));
+    const outcome none = draw(folder, file, "o.vtu", {"-t", "fraction", "--threshold", "1", "-s", "9"});
+    EXPECT_EQ(0, none.code) << none.err;
+    EXPECT_NE(std::string::npos, none.err.find("no voxel has a fraction of at least 1")) << none.err;
+}
+
+TEST(Fraction, HexahedraOfASolidAreItsVoxels) {
+    const scratch_folder folder;
+    builder file;
+    add(file, tilted);
+    const outcome dense = draw(folder, file, "o.vtu", {"-t", "fraction,occupancy", "--solid", "nonzero"});
+    ASSERT_EQ(0, dense.code) << dense.err;
+    ASSERT_EQ(0, draw(folder, file, "o.npy", {"--solid", "nonzero"}).code);
+    const array bits = read_npy(folder / "o.npy");
+    std::size_t voxels = 0;
+    for (std::size_t i = 0; i < bits.voxels(); ++i) voxels += bits.at<std::uint8_t>(i);
+    EXPECT_EQ(voxels, cells_of(read_file(folder / "o.vtu")));
+    // From bricks and tiles, the same files.
+    for (const std::string extension : {".vtu", ".inp", ".msh"}) {
+        ASSERT_EQ(0, draw(folder, file, "a" + extension, {"--solid", "nonzero", "-t", "material"}).code);
+        ASSERT_EQ(0, draw(folder, file, "b" + extension, {"--solid", "nonzero", "-t", "material", "--sparse"}).code);
+        EXPECT_TRUE(read_file(folder / ("a" + extension)) == read_file(folder / ("b" + extension))) << extension;
+    }
+}
+
 TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
     const scratch_folder folder;
     builder file;
@@ -255,6 +311,11 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
     refused({"-t", "fraction", "--levels"}, "--levels and --target fraction", 1, "o.zarr");
     refused({"-t", "fraction", "--distance"}, "fraction does not go with --distance");
     refused({"-t", "fraction"}, "adds the inside", 1, "o.nvdb");
+    refused({"-t", "fraction"}, "--threshold takes voxels by their fractions", 1, "o.vtu");
+    refused({"-t", "fraction", "--threshold", "0.5"}, "--threshold: .npy has no hexahedra; .vtu, .inp and .msh have");
+    refused({"--threshold", "0.5"}, "--threshold goes with --target fraction", 1, "o.inp");
+    for (const std::string bad : {"0", "-1", "1.001", "nan"})
+        refused({"-t", "fraction", "--threshold", bad}, "--threshold takes a fraction above 0 and up to 1", 1, "o.msh");
     refused({"--clamp"}, "--clamp goes with --target fraction");
     refused({"-t", "fraction", "--backend", "cuda"}, "on the CPU alone", 5);
     const outcome large =

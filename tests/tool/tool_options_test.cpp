@@ -84,6 +84,7 @@ std::set<std::string> all_options() {
             "--pieces N",
             "--merge",
             "--points",
+            "--threshold FRACTION",
             "--stats [json]",
             "-q,--quiet",
             "-h,--help",

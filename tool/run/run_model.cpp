@@ -68,6 +68,7 @@ std::vector<std::filesystem::path> write_to(const sparse_volume& voxels, const s
 template <class Volume>
 std::vector<std::filesystem::path> write_output(Volume& voxels, const command_line& options,
                                                 const std::filesystem::path& output, const write_options& how) {
+    const format& f = *find_format(output);
     std::vector<channel> aside;
     if constexpr (std::is_same_v<Volume, volume>)
         if (options.voxelize.distance && shows_level(output)) {
@@ -76,25 +77,30 @@ std::vector<std::filesystem::path> write_output(Volume& voxels, const command_li
             voxels.channels.pop_back();
             return files;
         }
-    if (const format* const f = find_format(output); f->all_channels && !f->needs_occupancy)
+    if (f.all_channels && !f.needs_occupancy)
         while (aside.size() < options.implied.size()) {
             aside.push_back(std::move(voxels.channels.back()));
             voxels.channels.pop_back();
         }
-    // What --blocks asks for is in files of blocks alone.
-    const bool has_own = find_format(output)->has_blocks || std::find(options.implied.begin(), options.implied.end(),
-                                                                      target::material) == options.implied.end();
-    const auto material = std::find_if(voxels.channels.begin(), voxels.channels.end(), [&](const channel& c) {
-        return !has_own && c.name == info_of(target::material).name;
-    });
-    const auto place = material - voxels.channels.begin();
-    std::optional<channel> left_out;
-    if (material != voxels.channels.end()) {
-        left_out = std::move(*material);
-        voxels.channels.erase(material);
-    }
+    // What only other outputs ask for: materials for blocks; colours, and occupied voxels where cells are chosen by
+    // their fractions, beside hexahedra.
+    const auto is_left_out = [&](const channel& c) {
+        const auto is_implied = [&](target id) {
+            return c.name == info_of(id).name &&
+                   std::find(options.implied.begin(), options.implied.end(), id) != options.implied.end();
+        };
+        return (!f.has_blocks && is_implied(target::material)) || (f.has_threshold && is_implied(target::color)) ||
+               (f.has_threshold && how.threshold > 0 && is_implied(target::occupancy));
+    };
+    std::vector<std::pair<std::ptrdiff_t, channel>> left_out; // with their places, from the last one
+    for (auto n = static_cast<std::ptrdiff_t>(voxels.channels.size()); n-- > 0;)
+        if (is_left_out(voxels.channels[static_cast<std::size_t>(n)])) {
+            left_out.emplace_back(n, std::move(voxels.channels[static_cast<std::size_t>(n)]));
+            voxels.channels.erase(voxels.channels.begin() + n);
+        }
     std::vector<std::filesystem::path> files = write_to(voxels, output, how);
-    if (left_out) voxels.channels.insert(voxels.channels.begin() + place, std::move(*left_out));
+    for (; !left_out.empty(); left_out.pop_back())
+        voxels.channels.insert(voxels.channels.begin() + left_out.back().first, std::move(left_out.back().second));
     for (; !aside.empty(); aside.pop_back()) voxels.channels.push_back(std::move(aside.back()));
     return files;
 }

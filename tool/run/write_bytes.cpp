@@ -39,6 +39,19 @@ double bytes_of_mesh(const expected_result& result, double voxels, double thread
     return of_voxel * voxels + threads * of_corner * result.extent.x * result.extent.y;
 }
 
+// A list of the bricks by their rows, first numbers of the parts, and what threads make of parts that wait to be
+// written.
+double bytes_of_hexahedra(const std::string& extension, const expected_result& result, double bricks, double voxels,
+                          double threads) {
+    constexpr double of_brick = 24, of_part = 64, rows_of_part = 8, parts_of_thread = 5, least_voxels_of_part = 32768;
+    const double parts = std::min(1.0 * result.extent.z * result.extent.y / rows_of_part, double{1 << 22});
+    const double waiting =
+        std::min(voxels, threads * parts_of_thread * std::max(least_voxels_of_part, rows_of_part * result.extent.x));
+    constexpr double of_line = 200, of_element = 150, of_corners = 60; // in strings that grow, but for .vtu
+    const double of_voxel = extension == ".inp" ? of_line : extension == ".msh" ? of_element : of_corners;
+    return of_brick * bricks + of_part * parts + of_voxel * waiting;
+}
+
 double bytes_of_picture(const preview_options& options) {
     constexpr double of_pixel = 100, of_first_pixels = 200, most_of_these = 12 << 20;
     const double pixels = static_cast<double>(options.width) * options.height;
@@ -70,8 +83,17 @@ double bytes_to_write(const std::filesystem::path& output, const expected_result
     const value_bytes values = bytes_of_values(result.targets);
     const double threads = thread_count(options.threads);
     double bricks = result.bricks, voxels = result.voxels, bytes = bytes_of_any;
-    if (is_one_of(extension, {".npz", ".vti", ".pvti", ".nrrd", ".schem", ".litematic", ".3mf", ".html"}))
+    const bool is_hexahedra = is_one_of(extension, {".vtu", ".inp", ".msh"});
+    if (is_hexahedra && options.threshold > 0) { // any voxel may be one, and has a bit
+        constexpr double brick_voxels = 512, bits_of_byte = 8;
+        voxels = static_cast<double>(result.extent.x) * result.extent.y * result.extent.z;
+        bricks = voxels / brick_voxels;
+        bytes += voxels / bits_of_byte;
+    }
+    if (is_one_of(extension, {".npz", ".vti", ".pvti", ".nrrd", ".schem", ".litematic", ".3mf", ".html", ".vtu"}))
         bytes += threads * bytes_of_thread;
+    // Blocks of .vtu are gathered for all threads, in memory that grows.
+    if (extension == ".vtu") bytes += std::min(threads * 2 * bytes_of_thread, 64 * voxels);
     if (extension == ".zarr") {
         constexpr double chunk_voxels = 64 * 64 * 64, copies = 2.3; // as it is, and with room for what it becomes
         bytes += threads * (bytes_of_thread / 2 + copies * chunk_voxels * values.largest);
@@ -88,8 +110,8 @@ double bytes_to_write(const std::filesystem::path& output, const expected_result
         voxels += result.in_tiles;
         bytes += (brick_bytes + source_bytes) * bricks + values.all * voxels;
     }
-    const bool shows_shape = is_one_of(
-        extension, {".vox", ".schem", ".litematic", ".binvox", ".glb", ".obj", ".ply", ".stl", ".3mf", ".xyz"});
+    const bool shows_shape = is_one_of(extension, {".vox", ".schem", ".litematic", ".binvox", ".glb", ".obj", ".ply",
+                                                   ".stl", ".3mf", ".xyz", ".vtu", ".inp", ".msh"});
     if (!result.is_sparse && (shows_shape || is_one_of(extension, {".html", ".nvdb", ".vdb"}))) {
         constexpr double found_bytes = 90; // the bricks of each layer before they are sorted
         bytes += (brick_bytes + found_bytes) * bricks;
@@ -101,6 +123,7 @@ double bytes_to_write(const std::filesystem::path& output, const expected_result
     if (extension == ".obj") bytes += of_line_of_mesh * std::min(2 * voxels, threads * items_at_once);
     if (extension == ".stl") bytes += of_triangle_of_stl * std::min(4 * voxels, threads * items_at_once);
     if (extension == ".3mf") bytes += of_line_of_mesh * std::min(3 * voxels, threads * items_at_once);
+    if (is_hexahedra) bytes += bytes_of_hexahedra(extension, result, bricks, voxels, threads);
     // A piece of the blocks as numbers and as bytes, and 64 rows at least.
     if (is_one_of(extension, {".schem", ".litematic"})) bytes += threads * 4 * std::max(1 << 19, 64 * result.extent.x);
     if (extension == ".xyz") bytes += of_line_of_point * std::min(voxels, threads * items_at_once);

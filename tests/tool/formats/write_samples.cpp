@@ -100,7 +100,7 @@ std::vector<sample_case> make_cases() {
     const std::vector<std::string> any{".npy", ".npz", ".vti", ".pvti", ".nrrd", ".zarr"};
     const std::vector<std::string> solid{".npy",   ".npz",       ".vti",    ".nrrd", ".zarr", ".vox",
                                          ".schem", ".litematic", ".binvox", ".glb",  ".obj",  ".ply",
-                                         ".stl",   ".3mf",       ".xyz",    ".png",  ".html"};
+                                         ".stl",   ".3mf",       ".xyz",    ".png",  ".html", ".vtu"};
     const std::vector<std::string> meshes{".glb", ".obj", ".ply", ".stl", ".3mf"};
     std::vector<sample_case> cases;
     const auto add = [&](const char* name, std::array<std::int64_t, 3> extent, std::uint32_t density, bool color,
@@ -121,24 +121,34 @@ std::vector<sample_case> make_cases() {
     add("split_y", {270, 513, 33}, 997, true, false, {".vox"});
     add("empty", {9, 8, 7}, 0, false, false,
         {".npy", ".npz", ".vti", ".nrrd", ".zarr", ".schem", ".litematic", ".binvox", ".glb", ".obj", ".ply", ".stl",
-         ".3mf", ".xyz", ".png", ".html"});
+         ".3mf", ".xyz", ".png", ".html", ".vtu", ".inp", ".msh"});
     add("merged", {40, 33, 21}, 2, false, false, meshes).options.merge_faces = true;
     add("merged_colors", {40, 33, 21}, 1, true, false, meshes).options.merge_faces = true;
     add("pieces", {37, 23, 11}, 5, true, false, meshes).options.faces_per_file = 1000;
     add("points", {37, 23, 11}, 5, true, false, {".ply"}).options.points = true;
-    add("boxes", {37, 23, 11}, 5, true, false, {".glb", ".obj", ".ply", ".stl", ".3mf", ".xyz"}).v.voxel_size = {
-        0.1, 0.25, 3};
-    sample_case& flat = add("stored", {37, 23, 11}, 5, true, false, {".3mf"});
+    add("boxes", {37, 23, 11}, 5, true, false, {".glb", ".obj", ".ply", ".stl", ".3mf", ".xyz", ".vtu", ".inp", ".msh"})
+        .v.voxel_size = {0.1, 0.25, 3};
+    sample_case& flat = add("stored", {37, 23, 11}, 5, true, false, {".3mf", ".vtu"});
     flat.options.compression = 0;
     // Blocks of a list: of three materials out of five, and of more colours than a byte can number.
     sample_case& listed = add("listed", {37, 23, 11}, 2, true, false, {".schem", ".litematic"});
     listed.options.blocks = many_blocks();
     add_materials(listed.v);
+    // Hexahedra: of five materials and of voxels without, by fractions, and with numbers of 64 bits.
+    const std::vector<std::string> hexahedra{".vtu", ".inp", ".msh"};
+    add_materials(add("materials", {70, 13, 11}, 2, true, false, hexahedra).v);
+    add("none", {9, 8, 7}, 5, false, false, hexahedra).v.add("material", scalar::i32); // all are of number 0
+    sample_case& chosen = add("chosen", {37, 23, 11}, 5, false, false, hexahedra);
+    chosen.v.add("fraction", scalar::f32);
+    fill(chosen.v, 1);
+    chosen.options.threshold = 0.125;
+    add("wide", {37, 23, 11}, 5, false, false, {".vtu"}).options.highest_number = 1000;
     sample_case& types = add("types", {13, 7, 5}, 2, false, true, any);
     types.v.voxel_size = {0.1, 0.25, 3};
-    types.extensions.push_back(".html");
+    types.extensions.insert(types.extensions.end(), {".html", ".vtu"});
     types.options.pieces = 3;
     sample_case& raw = add("raw", {13, 7, 5}, 2, false, true, any);
+    raw.extensions.emplace_back(".vtu");
     raw.options.compression = 0;
     if (has_zstd()) add("zstd", {150, 70, 90}, 5, true, false, {".zarr"}).options.zstd = true;
     // Channels of every type that .nvdb has. Floats come first, since tinyvdb reads the first grid alone.
@@ -193,7 +203,7 @@ std::string describe(const sample_case& c, const std::map<std::string, std::vect
         out.append("[\"").append(ch.name).append("\", \"").append(name_of(ch.type));
         out.append("\", ").append(std::to_string(ch.components)).append("]");
     }
-    out += "],\n   \"listed\": ";
+    out += "],\n   \"threshold\": " + list_of(std::array{c.options.threshold}) + ", \"listed\": ";
     out += c.options.blocks ? "true" : "false";
     out += ", \"files\": {";
     bool first = true;

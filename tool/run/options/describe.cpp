@@ -383,7 +383,7 @@ void describe_picture(CLI::App& app, command_line& options, raw_options& raw) {
     app.add_flag("--no-ground", raw.no_ground, "No shadow on the ground")->group("Picture (.png)");
 }
 
-void describe_output(CLI::App& app, command_line& options) {
+void describe_output(CLI::App& app, command_line& options, raw_options& raw) {
     add_choice(app, "--up", options.write.up, {{"y", up_axis::y}, {"z", up_axis::z}},
                "Axis of the model that stands upright in .png, .vox, .schem and .litematic: y or z. Default: y, as in "
                "glTF; many "
@@ -401,6 +401,11 @@ void describe_output(CLI::App& app, command_line& options) {
                    "#rrggbb, or material and a name: voxels become the block of their material, or of the nearest "
                    "colour")
         ->option_text("FILE")
+        ->group("Files");
+    app.add_option("--threshold", raw.threshold,
+                   "With --target fraction: the hexahedra of .vtu, .inp and .msh are the voxels whose fraction is at "
+                   "least this, above 0 and up to 1")
+        ->option_text("FRACTION")
         ->group("Files");
     app.add_flag("--levels", options.write.levels,
                  "Write each value of .zarr with its mip levels, as an OME-Zarr multiscale image")
@@ -455,7 +460,7 @@ void describe(CLI::App& app, command_line& options, raw_options& raw) {
     describe_remesh(app, raw);
     describe_machine(app, options);
     describe_picture(app, options, raw);
-    describe_output(app, options);
+    describe_output(app, options, raw);
     describe_messages(app, options);
 }
 

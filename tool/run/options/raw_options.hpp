@@ -35,6 +35,7 @@ struct raw_options {
     std::optional<voxelpipe::place> place;
     bool quads = false;
     bool report = false;
+    std::optional<double> threshold;
     std::vector<std::string> targets;
     bool no_edges = false;
     bool no_ground = false;

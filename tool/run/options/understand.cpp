@@ -289,7 +289,8 @@ void understand_outputs(command_line& options, const raw_options& raw) {
             size && found->needs_cubes && !are_cubic({size->x, size->y, size->z}))
             throw usage_error("\"" + output.string() + "\": " + std::string(found->extension) +
                               " has one voxel size for all axes, --voxel-size has several");
-        needs_occupancy = needs_occupancy || found->needs_occupancy;
+        const bool is_chosen = found->has_threshold && raw.threshold; // by the fractions
+        needs_occupancy = needs_occupancy || (found->needs_occupancy && !is_chosen);
         shows_colors = shows_colors || found->shows_colors;
     }
     const auto require = [&](bool given, const char* option, const char* what, const char* who, bool format::*has) {
@@ -302,6 +303,10 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     require(options.write.pieces != 0, "--pieces", "pieces", ".pvti and .nvdb have", &format::has_pieces);
     require(options.write.slice_bits != 0, "--slice-bits", "slices", "{z}.png has", &format::has_layers);
     require(!options.block_file.empty(), "--blocks", "blocks", ".schem and .litematic have", &format::has_blocks);
+    require(raw.threshold.has_value(), "--threshold", "hexahedra", ".vtu, .inp and .msh have", &format::has_threshold);
+    if (raw.threshold && !(*raw.threshold > 0 && *raw.threshold <= 1))
+        throw usage_error("--threshold takes a fraction above 0 and up to 1");
+    options.write.threshold = raw.threshold.value_or(0);
     if (!options.block_file.empty()) {
         try {
             options.blocks = std::make_shared<block_list>(read_block_list(options.block_file));
@@ -333,7 +338,8 @@ void understand_outputs(command_line& options, const raw_options& raw) {
         const bool held = std::any_of(options.outputs.begin(), options.outputs.end(), [&](const auto& output) {
             const format* const found = find_format(output);
             return id == target::occupancy || id == target::distance || found->all_channels ||
-                   (found->shows_colors && is_color(id)) ||
+                   (found->shows_colors && is_color(id)) || (found->has_materials && id == target::material) ||
+                   (found->has_threshold && raw.threshold && id == target::fraction) ||
                    (found->extension == ".png" && shows_values && id == *pictured);
         });
         if (!held)
@@ -369,6 +375,7 @@ void understand_fractions(command_line& options, const raw_options& raw) {
     const voxelize_request& request = options.voxelize;
     if (!request.wants(target::fraction)) {
         if (request.clamp) throw usage_error("--clamp goes with --target fraction");
+        if (raw.threshold) throw usage_error("--threshold goes with --target fraction");
         return;
     }
     const std::string together = " and --target fraction do not go together: ";
@@ -389,11 +396,15 @@ void understand_fractions(command_line& options, const raw_options& raw) {
     if (options.by_slabs)
         throw usage_error("--target fraction is one piece of work: no --resume, and no processes that share a model");
     if (options.write.levels) throw usage_error("--levels" + together + "fractions have no mip levels");
-    for (const std::filesystem::path& output : options.outputs)
-        if (find_format(output)->only_sparse && !request.solid)
+    for (const std::filesystem::path& output : options.outputs) {
+        const format& f = *find_format(output);
+        const bool is_chosen = f.has_threshold && raw.threshold; // by the fractions
+        if ((f.only_sparse || f.has_threshold) && !is_chosen && !request.solid)
             throw usage_error('"' + output.string() +
                               "\": it holds occupied voxels alone, which are those of the surface; --solid nonzero "
-                              "beside --target fraction adds the inside");
+                              "beside --target fraction adds the inside" +
+                              (f.has_threshold ? ", --threshold takes voxels by their fractions" : ""));
+    }
 }
 
 void understand_picture(command_line& options, const raw_options& raw) {

@@ -43,8 +43,9 @@ void expand_bits(const volume& v, const channel& c, std::uint64_t begin, std::sp
     }
 }
 
-// IEEE 754 binary16 to binary32; exact for every value, NaN payloads included.
-std::uint32_t widen(std::uint16_t half) {
+} // namespace
+
+std::uint32_t widened_half(std::uint16_t half) {
     const std::uint32_t sign = static_cast<std::uint32_t>(half & 0x8000u) << 16;
     const std::uint32_t exponent = half >> 10 & 0x1fu;
     const std::uint32_t mantissa = half & 0x3ffu;
@@ -55,8 +56,6 @@ std::uint32_t widen(std::uint16_t half) {
     const auto shift = static_cast<std::uint32_t>(std::countl_zero(mantissa)) - 21;
     return sign | (113 - shift) << 23 | (mantissa << shift & 0x3ffu) << 13;
 }
-
-} // namespace
 
 scalar streamed_type(scalar type, half_floats halves) {
     if (type == scalar::bit) return scalar::u8;
@@ -93,7 +92,7 @@ std::span<const std::byte> streamed_piece(const volume& v, const channel& c, hal
     for (std::size_t i = 0; i < count; ++i) {
         std::uint16_t half;
         std::memcpy(&half, c.data.data() + 2 * (first + i), 2);
-        const std::uint32_t wide = widen(half);
+        const std::uint32_t wide = widened_half(half);
         std::memcpy(room.data() + 4 * i, &wide, 4);
     }
     return std::span{room}.subspan(skip, size);

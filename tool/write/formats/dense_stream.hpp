@@ -21,6 +21,9 @@ enum class half_floats { keep, widen };
 // Receives the next piece; it is valid only during the call.
 using byte_sink = std::function<void(std::span<const std::byte>)>;
 
+// IEEE 754 binary16 to binary32; exact for every value, NaN payloads included.
+[[nodiscard]] std::uint32_t widened_half(std::uint16_t half);
+
 // Type of the streamed values: u8 for a bit channel, f32 for a widened f16 one, otherwise the channel's own.
 [[nodiscard]] scalar streamed_type(scalar type, half_floats halves);
 

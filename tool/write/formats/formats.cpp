@@ -4,8 +4,10 @@
 #include "formats.hpp"
 
 #include "binvox.hpp"
+#include "inp.hpp"
 #include "litematic.hpp"
 #include "mesh.hpp"
+#include "msh.hpp"
 #include "npy.hpp"
 #include "npz.hpp"
 #include "nrrd.hpp"
@@ -16,14 +18,17 @@
 #include "vox.hpp"
 #include "voxel_shape.hpp"
 #include "vti.hpp"
+#include "vtu.hpp"
 #include "zarr.hpp"
 
+#include "model/parallel.hpp"
 #include "write/page/page.hpp"
 #include "write/sparse_formats.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <string>
 
 namespace voxelize {
@@ -60,9 +65,15 @@ constexpr auto all_formats = std::to_array<format>({
     {".3mf", "the same as a 3MF of triangles for printing, in millimetres, colours of the faces", true, false, true,
      false},
     {".xyz", "centres of the voxels as text: x y z and red green blue, 0 to 255", true, false, true, false},
+    {".vtu", "VTK unstructured grid of a hexahedron for each voxel, with all channels; see --threshold", true, true,
+     false, false, false, false, false, false, true, true},
+    {".inp", "the same for Abaqus and CalculiX, with sets of materials, sides and their nodes", true, false, false,
+     false, false, false, false, false, true, true},
+    {".msh", "the same for Gmsh 4.1, with a physical group for each material", true, false, false, false, false, false,
+     false, false, true, true},
     {".png", "shaded picture of the voxels", true, false, true, false},
     {"{z}.png", "grey slices along z, OUT/0000.png, ...: occupancy, or fractions; see --slice-bits", false, true, false,
-     false, false, false, false, false, true},
+     false, false, false, false, false, false, false, true},
     {".html", "a page that shows the voxels in a browser: turn, cut, choose values", true, true, true, false},
     {".nvdb", "NanoVDB: a grid for each channel, of the occupied voxels alone", true, true, true, false, true, false,
      true},
@@ -87,6 +98,9 @@ constexpr auto all_writers = std::to_array<writer>({
     {nullptr, write_stl, mesh_names},
     {nullptr, write_3mf, mesh_names},
     {nullptr, write_xyz},
+    {nullptr, write_vtu},
+    {nullptr, write_inp},
+    {nullptr, write_msh},
     {write_png},
     {write_slices, nullptr, slice_names},
     {write_page},
@@ -113,6 +127,29 @@ void check_cubes(const format& f, const std::array<double, 3>& voxel_size, const
                                 number(x) + ", " + number(y) + " and " + number(z));
 }
 
+// The voxels of a volume whose fraction is at least the threshold, as the occupancy of a volume without others.
+volume above_threshold(const volume& v, const std::filesystem::path& path, const write_options& options) {
+    const channel* const fractions = v.find("fraction");
+    if (fractions == nullptr || fractions->type != scalar::f32 || fractions->components != 1)
+        throw write_error(path, "a threshold needs the channel \"fraction\", of one float a voxel");
+    volume result;
+    result.extent = v.extent;
+    result.origin = v.origin;
+    result.voxel_size = v.voxel_size;
+    result.add("occupancy", scalar::bit);
+    const auto least = static_cast<float>(options.threshold);
+    parallel_for(static_cast<std::size_t>(v.extent[2]), thread_count(options.threads), [&](std::size_t plane) {
+        const auto k = static_cast<std::int64_t>(plane);
+        for (std::int64_t j = 0; j < v.extent[1]; ++j)
+            for (std::int64_t i = 0; i < v.extent[0]; ++i) {
+                float value;
+                std::memcpy(&value, fractions->data.data() + 4 * v.index(i, j, k), sizeof(value));
+                if (value >= least) result.set_bit(result.channels.front(), i, j, k);
+            }
+    });
+    return result;
+}
+
 } // namespace
 
 bool are_cubic(const std::array<double, 3>& voxel_size) {
@@ -131,7 +168,7 @@ const format* find_format(const std::filesystem::path& path) {
 }
 
 std::string_view why_no_stream(const format& f) {
-    constexpr std::array<std::string_view, 4> seek{".npz", ".vti", ".3mf", ".vdb"};
+    constexpr std::array<std::string_view, 5> seek{".npz", ".vti", ".vtu", ".3mf", ".vdb"};
     if (std::find(seek.begin(), seek.end(), f.extension) != seek.end())
         return "it has what is known only at the end before what comes earlier";
     if (f.extension == ".pvti" || f.extension == ".zarr" || f.has_layers) return "it is several files";
@@ -144,10 +181,17 @@ std::vector<std::filesystem::path> write(const volume& v, const std::filesystem:
     v.check();
     if (v.channels.empty()) throw write_error(path, "there is no channel to write");
     const bool is_band = v.distances && f.only_sparse; // the band stands for it
-    if (f.needs_occupancy && !is_band && v.occupancy() == nullptr)
+    const bool has_threshold = f.has_threshold && options.threshold > 0;
+    if (f.needs_occupancy && !is_band && !has_threshold && v.occupancy() == nullptr)
         throw write_error(path, std::string(f.extension) + " needs the occupancy");
     check_cubes(f, v.voxel_size, path);
     const writer& w = all_writers[number_of(f)];
+    if (has_threshold) {
+        const volume cells = above_threshold(v, path, options);
+        if (options.warn && cells.popcount() == 0)
+            options.warn("\"" + path.string() + "\": no voxel has a fraction of at least " + number(options.threshold));
+        return w.of_shape(voxel_shape(v, cells, options.threads), path, options);
+    }
     if (w.of_shape != nullptr) return w.of_shape(voxel_shape(v, options.threads), path, options);
     return w.of_channels(v, path, options);
 }

@@ -24,7 +24,7 @@ namespace voxelize {
 struct block_list; // blocks.hpp
 
 struct write_options {
-    // zlib level of .npz, .vti, .nrrd, .zarr, .3mf, {z}.png, .schem, .litematic: 0 stores (the last two: 1), 9 is
+    // zlib level of .npz, .vti, .vtu, .nrrd, .zarr, .3mf, {z}.png, .schem, .litematic: 0 stores (the last two: 1), 9 is
     // smallest
     int compression = 1;
     bool zstd = false;   // .zarr: Zstandard instead of gzip, where has_zstd()
@@ -39,8 +39,13 @@ struct write_options {
     bool points = false;      // .ply holds the voxels' centres, not their outer sides
     bool lists = true;        // .npy, .npz of a sparse volume list its voxels; false: they hold the grid
     std::uint64_t faces_per_file =
-        0;                   // .ply, .obj, .glb, .stl, .3mf: most faces in a file; 0: what the format can number
-    preview_options preview; // camera and light of .png
+        0; // .ply, .obj, .glb, .stl, .3mf: most faces in a file; 0: what the format can number
+    // .vtu, .inp, .msh: the cells are the voxels whose channel "fraction" is at least this one, above 0, rounded to a
+    // float; 0: the occupied voxels.
+    double threshold = 0;
+    // .vtu, .inp: the highest number of a node that 32 bits, or the format, hold; 0: as it is.
+    std::uint64_t highest_number = 0;
+    preview_options preview;                  // camera and light of .png
     std::shared_ptr<const block_list> blocks; // .schem, .litematic: what voxels become; null: default_blocks()
     std::function<void(double)> progress;     // called with 0..1 now and then, from the calling thread; may be empty
     // Called with a line that names the file, where it is written but readers of its format do not show all of it; from
@@ -60,6 +65,8 @@ struct format {
     bool has_levels = false;      // obeys write_options::levels
     bool has_pieces = false;      // obeys write_options::pieces
     bool has_blocks = false;      // obeys write_options::blocks
+    bool has_threshold = false;   // obeys write_options::threshold
+    bool has_materials = false;   // holds the numbers of materials, whether it holds other channels or not
     bool has_layers = false;      // a file for each layer of one target: obeys write_options::slice_bits
 };
 
@@ -113,7 +120,7 @@ enum class held_as : std::uint8_t { grid, list, unknown };
 void check_replaceable(const std::filesystem::path& path);
 
 // Writes occupied voxels and their colours (voxel_shape.hpp), for formats that show those alone: all but .npy, .npz,
-// .vti, .pvti, .nrrd, .zarr, .png, .html, .nvdb and .vdb.
+// .vti, .pvti, .nrrd, .zarr, .png, .html, .nvdb and .vdb. There is no threshold here.
 class voxel_shape;
 std::vector<std::filesystem::path> write(const voxel_shape& v, const std::filesystem::path& path,
                                          const write_options& options);

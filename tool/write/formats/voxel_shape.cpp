@@ -22,14 +22,17 @@ const channel* materials_of(const channel* found) {
 
 } // namespace
 
-voxel_shape::voxel_shape(const volume& v, int threads)
-    : extent(v.extent), origin(v.origin), voxel_size(v.voxel_size), own_(find_bricks(v, threads)), bricks_(&own_),
-      colors_(find_colors(v)), materials_(materials_of(v.find("material"))), by_rank_(false), clay_rgb_(packed(clay)) {}
+voxel_shape::voxel_shape(const volume& v, int threads) : voxel_shape(v, v, threads) {}
+
+voxel_shape::voxel_shape(const volume& v, const volume& occupied, int threads)
+    : extent(v.extent), origin(v.origin), voxel_size(v.voxel_size), own_(find_bricks(occupied, threads)),
+      bricks_(&own_), channels_(v.channels), colors_(find_colors(v)), materials_(materials_of(v.find("material"))),
+      by_rank_(false), clay_rgb_(packed(clay)) {}
 
 voxel_shape::voxel_shape(const sparse_volume& v)
     : extent(v.shape.extent), origin(v.shape.origin), voxel_size(v.shape.voxel_size), bricks_(&v),
-      colors_(find_colors(v.channels)), materials_(materials_of(v.find("material"))), by_rank_(true),
-      clay_rgb_(packed(clay)) {}
+      channels_(v.channels), colors_(find_colors(v.channels)), materials_(materials_of(v.find("material"))),
+      by_rank_(true), clay_rgb_(packed(clay)) {}
 
 brick_order::brick_order(const voxel_shape& shape, int axis, std::size_t first, std::size_t last)
     : shape_(shape), axis_(axis) {

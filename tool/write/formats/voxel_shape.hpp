@@ -26,6 +26,8 @@ public:
     // The volume has the occupancy, whose bricks are found first.
     voxel_shape(const volume& v, int threads);
     explicit voxel_shape(const sparse_volume& v);
+    // The occupied voxels of a volume of the same grid, with the values of V.
+    voxel_shape(const volume& v, const volume& occupied, int threads);
     voxel_shape(const voxel_shape&) = delete;
     voxel_shape& operator=(const voxel_shape&) = delete;
     ~voxel_shape() = default;
@@ -58,6 +60,22 @@ public:
         std::memcpy(&number, materials_->data.data() + value_of(brick, voxel) * sizeof(number), sizeof(number));
         return number;
     }
+    // All channels; those without data are bits that every voxel has.
+    [[nodiscard]] std::span<const channel> channels() const { return channels_; }
+    // Number of the value of an occupied voxel of a brick in a channel that is not of bits.
+    [[nodiscard]] std::uint64_t value_of(std::size_t brick, const glm::ivec3& voxel) const {
+        if (!by_rank_) return static_cast<std::uint64_t>((voxel.z * extent[1] + voxel.y) * extent[0] + voxel.x);
+        const auto bit =
+            static_cast<unsigned>(voxelpipe::core::morton_key(voxel) % voxelpipe::core::sparse_brick_voxels);
+        return bricks_->offsets[brick] + bricks_->masks[brick].before(bit);
+    }
+    // The bit of an occupied voxel in a channel of bits.
+    [[nodiscard]] bool bit_of(const channel& bits, const glm::ivec3& voxel) const {
+        if (by_rank_) return true;
+        const std::int64_t row = (voxel.z * extent[1] + voxel.y) * ((extent[0] + 31) / 32);
+        const auto byte = static_cast<std::size_t>(4 * row + voxel.x / 8);
+        return (std::to_integer<unsigned>(bits.data[byte]) >> (voxel.x % 8) & 1U) != 0;
+    }
     // Calls visit(rgb) for the voxels of a brick.
     template <class Visit>
     void for_each_color(std::size_t brick, const Visit& visit) const {
@@ -67,13 +85,6 @@ public:
     }
 
 private:
-    // Number of a voxel's value in a channel.
-    [[nodiscard]] std::uint64_t value_of(std::size_t brick, const glm::ivec3& voxel) const {
-        if (!by_rank_) return static_cast<std::uint64_t>((voxel.z * extent[1] + voxel.y) * extent[0] + voxel.x);
-        const auto bit =
-            static_cast<unsigned>(voxelpipe::core::morton_key(voxel) % voxelpipe::core::sparse_brick_voxels);
-        return bricks_->offsets[brick] + bricks_->masks[brick].before(bit);
-    }
     [[nodiscard]] std::uint32_t rgb_at(std::uint64_t value) const {
         const std::byte* at = colors_->data.data() + value * static_cast<std::uint64_t>(colors_->components);
         return std::to_integer<std::uint32_t>(at[0]) | std::to_integer<std::uint32_t>(at[1]) << 8 |
@@ -82,6 +93,7 @@ private:
 
     sparse_volume own_; // of a dense volume
     const sparse_volume* bricks_;
+    std::span<const channel> channels_;
     const channel *colors_, *materials_;
     bool by_rank_; // values lie in the order of the bricks, not of the grid
     std::uint32_t clay_rgb_;

@@ -7,6 +7,7 @@
 #include "dense_stream.hpp"
 #include "progress.hpp"
 #include "text.hpp"
+#include "vtk_xml.hpp"
 
 #include <algorithm>
 #include <array>
@@ -18,15 +19,6 @@
 
 namespace voxelize {
 namespace {
-
-// Uncompressed bytes of one zlib block; VTK decodes a block at a time.
-constexpr std::size_t block_bytes = std::size_t{1} << 20;
-
-std::string_view vtk_type(scalar type) {
-    constexpr std::array<std::string_view, 10> names{"UInt8", "UInt8", "UInt16",  "UInt32",  "UInt64",
-                                                     "Int32", "Int64", "Float32", "Float32", "Float64"};
-    return names[static_cast<std::size_t>(type)];
-}
 
 // Files that are written at a time, and so open.
 constexpr std::int64_t most_pieces = 512;
@@ -102,32 +94,17 @@ void write_raw(output_file& out, const volume& v, const channel& c, progress_met
     });
 }
 
-// One array in zlib blocks: number of blocks, bytes of a block, bytes of the last one where it is shorter (else 0), the
-// compressed bytes of each; then the blocks. The sizes are filled in at the end.
+// One array in zlib blocks.
 void write_compressed(output_file& out, const volume& v, const channel& c, const write_options& options,
                       progress_meter& meter) {
-    const std::uint64_t total = streamed_bytes(v, c, half_floats::widen);
-    const std::uint64_t num_blocks = (total + block_bytes - 1) / block_bytes;
-    std::vector<std::uint64_t> table(3 + num_blocks);
-    table[0] = num_blocks;
-    table[1] = block_bytes;
-    table[2] = total % block_bytes;
-    const std::uint64_t table_at = out.tell();
-    out.write(std::as_bytes(std::span{table}));
-
-    std::size_t next = 3;
+    vtk_block_array blocks(out, streamed_bytes(v, c, half_floats::widen));
     piece_compressor compressor(piece_compressor::form::zlib, options.compression);
-    compress_channel(v, c, half_floats::widen, {}, block_bytes, options.threads, compressor,
+    compress_channel(v, c, half_floats::widen, {}, vtk_block_bytes, options.threads, compressor,
                      [&](const compressed_piece& piece) {
-                         out.write(piece.bytes);
-                         table[next++] = piece.bytes.size();
+                         blocks.add(piece);
                          meter.advance(piece.source_size);
                      });
-
-    const std::uint64_t end = out.tell();
-    out.seek(table_at);
-    out.write(std::as_bytes(std::span{table}));
-    out.seek(end);
+    blocks.finish();
 }
 
 void write_image(output_file& out, const volume& v, std::int64_t first_layer, const write_options& options,
