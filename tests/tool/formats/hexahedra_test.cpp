@@ -17,7 +17,7 @@ namespace {
 
 const std::vector<std::string> all_extensions{".vtu", ".inp", ".msh"};
 
-using numbers = std::vector<std::uint64_t>;
+using number_list = std::vector<std::uint64_t>;
 using corner_list = std::vector<std::array<std::uint64_t, 8>>;
 
 struct whole_mesh {
@@ -134,7 +134,7 @@ TEST_F(Hexahedra, NodesAndSidesAreThoseOfTheDefinition) {
                 << n << ' ' << c;
         }
     for (unsigned d = 0; d < 6; ++d) {
-        numbers cells, side_nodes, expected_cells;
+        number_list cells, side_nodes, expected_cells;
         std::vector<bool> is_of_side(nodes.size());
         for (std::size_t part = 0; part < mesh.num_parts(); ++part) {
             for (const std::uint64_t n : mesh.cells_at_side(part, d)) cells.push_back(n);
@@ -150,7 +150,7 @@ TEST_F(Hexahedra, NodesAndSidesAreThoseOfTheDefinition) {
                 if (static_cast<int>(nodes[corner][d / 2]) == voxels[n][axis] + static_cast<int>(d % 2))
                     is_of_side[corner] = true;
         }
-        numbers expected_nodes;
+        number_list expected_nodes;
         for (std::size_t n = 0; n < nodes.size(); ++n)
             if (is_of_side[n]) expected_nodes.push_back(n);
         EXPECT_TRUE(expected_cells == cells) << d;
