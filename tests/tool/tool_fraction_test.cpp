@@ -265,7 +265,8 @@ TEST(Fraction, ThresholdChoosesTheHexahedra) {
     }
     const std::string text = read_file(folder / "o.inp");
     EXPECT_NE(std::string::npos, text.find("\n" + std::to_string(counts[1]) + ", "));
-    const outcome none = draw(folder, file, "o.vtu", {"-t", "fraction", "--threshold", "1", "-s", "9"});
+    const outcome none =
+        run(folder, {folder / "m.glb", "-o", folder / "o.vtu", "-t", "fraction", "--threshold", "1", "-s", "9"});
     EXPECT_EQ(0, none.code) << none.err;
     EXPECT_NE(std::string::npos, none.err.find("no voxel has a fraction of at least 1")) << none.err;
 }

@@ -178,7 +178,7 @@ TEST_F(OutputFile, RefusesWhatItCannotWrite) {
     EXPECT_NE(
         message("a.abc").find(
             ".npy, .npz, .vox, .schem, .litematic, .binvox, .vti, .pvti, .nrrd, .zarr, .glb, .obj, .ply, .stl, .3mf, "
-            ".xyz, .png"),
+            ".xyz, .vtu, .inp, .msh, .png"),
         std::string::npos);
     EXPECT_NE(message("noextension").find("extension"), std::string::npos);
     for (const char* name : {"a.vox", "a.schem", "a.binvox", "a.glb", "a.obj", "a.ply", "a.stl", "a.xyz", "a.png"})

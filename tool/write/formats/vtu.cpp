@@ -58,7 +58,7 @@ vtu_array cell_array(const hexahedra& mesh, const channel& c) {
         std::byte* at = bytes.data();
         mesh.for_each_voxel(part, [&](std::uint64_t, std::size_t brick, const glm::ivec3& voxel) {
             if (c.type == scalar::bit) {
-                *at++ = std::byte{mesh.shape().bit_of(c, voxel)};
+                *at++ = static_cast<std::byte>(mesh.shape().bit_of(c, voxel));
                 return;
             }
             const std::uint64_t value = mesh.shape().value_of(brick, voxel);
