@@ -30,8 +30,9 @@ struct bit_row {
         if (words == nullptr || i < 0 || left <= 0) return 0;
         Word w = 0;
         if constexpr (sizeof(Word) == 8) {
-            w = words[2 * i];
-            if (left > 32) w |= Word{words[2 * i + 1]} << 32;
+            const std::uint32_t* const halves = words + 2 * static_cast<std::size_t>(i);
+            w = halves[0];
+            if (left > 32) w |= Word{halves[1]} << 32;
         } else {
             w = words[i];
         }
