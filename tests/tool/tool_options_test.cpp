@@ -42,6 +42,7 @@ std::set<std::string> all_options() {
             "--distance",
             "--band N|whole",
             "--blocks FILE",
+            "--slice-bits N",
             "--unsigned",
             "--corners",
             "--iso D",

@@ -144,7 +144,8 @@ TEST_F(OutputFile, SaysWhyItCannotOpen) {
 #ifdef __linux__
 // /dev/full is a device on which every write fails as on a full disk.
 TEST_F(OutputFile, EveryWriterReportsAFullDisk) {
-    volume v = make_colored({40, 30, 20});
+    volume v = make_colored({40, 30, 20}), occupied = v;
+    occupied.channels.resize(1); // all that slices hold
     for (const format& f : formats()) {
         if (f.extension == ".zarr") continue; // a folder: zarr_test.cpp
         const auto link = folder_ / ("full" + std::string(f.extension));
@@ -152,10 +153,11 @@ TEST_F(OutputFile, EveryWriterReportsAFullDisk) {
         if (f.extension == ".npy" || f.extension == ".nrrd") // one file for each channel
             links = {folder_ / ("full.occupancy" + std::string(f.extension)),
                      folder_ / ("full.color" + std::string(f.extension))};
+        if (f.has_layers) links = {folder_ / "full0000.png"};
         for (const auto& each : links) std::filesystem::create_symlink("/dev/full", each);
         write_options options;
         options.preview.width = options.preview.height = 64;
-        const std::string message = message_of([&] { write(v, link, options); });
+        const std::string message = message_of([&] { write(f.has_layers ? occupied : v, link, options); });
         EXPECT_NE(message.find("No space left on device"), std::string::npos) << f.extension << ": " << message;
         EXPECT_EQ(message.find('\n'), std::string::npos);
         for (const auto& each : links) EXPECT_TRUE(std::filesystem::is_symlink(each)) << each;
@@ -194,13 +196,15 @@ TEST_F(OutputFile, RefusesWhatItCannotWrite) {
 
 TEST_F(OutputFile, ProgressRunsToOne) {
     const volume v = make_colored({64, 64, 64});
+    volume occupied = v;
+    occupied.channels.resize(1); // all that slices hold
     for (const format& f : formats()) {
         std::vector<double> seen;
         write_options options;
         options.preview.width = options.preview.height = 100;
         options.threads = 2;
         options.progress = [&](double p) { seen.push_back(p); };
-        write(v, folder_ / ("out" + std::string(f.extension)), options);
+        write(f.has_layers ? occupied : v, folder_ / ("out" + std::string(f.extension)), options);
         ASSERT_FALSE(seen.empty()) << f.extension;
         EXPECT_DOUBLE_EQ(seen.back(), 1.0) << f.extension;
         EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end())) << f.extension;
