@@ -104,11 +104,12 @@ template <class Backend, class Blend, class Layout, class Label, class LabelBlen
 // Labels the set bits by their connected components: each gets the lowest number of the voxels in its component, and
 // voxels that are not set get no_label, which is -1. Voxel (i, j, k) has the number i + nx * (j + ny * k). The result
 // depends neither on threads nor on the backend. `bits` has any layout; bits of padding are not looked at. `labels` is
-// a linear target of std::int32_t, for grids of 2^31 voxels at most, or of std::int64_t: memory of the backend that the
-// call overwrites, whatever its blend and load operation. Of a framebuffer that tracks changes call forget_changes
-// afterwards. Fills status::label. Fails with bad_label_options for another connectivity, too_many_voxels for a grid
-// whose voxels the labels cannot number, extent_mismatch, bad_extent, extent_too_large and null_view, and writes
-// nothing then; labels mean nothing where memory runs out or the device fails. Returns after the work is done.
+// a linear target of std::int32_t, for grids of 2^31 voxels at most, or of std::int64_t, in memory of the backend. The
+// call overwrites it; the target's blend and load operation do not matter. A framebuffer that tracks changes does not
+// see this write: call its forget_changes afterwards. Fills status::label. Fails with bad_label_options for another
+// connectivity, too_many_voxels for a grid whose voxels the labels cannot number, extent_mismatch, bad_extent,
+// extent_too_large and null_view, and writes nothing then; labels mean nothing where memory runs out or the device
+// fails. Returns after the work is done.
 template <class Backend, class Blend, class Layout, class Label, class LabelBlend>
 [[nodiscard]] status label(Backend& backend, const target_view<target<bit, Blend, Layout>>& bits,
                            const target_view<target<Label, LabelBlend>>& labels, const label_options& options = {}) {
