@@ -119,11 +119,17 @@ constexpr int dense_resolution = 112, sparse_resolution = 200;
 const std::vector<double> multiples{1.0, 1.5, 2.0};
 #endif
 
-// All targets for formats that hold them, colours for the others. A grid has some MiB to some tens of them.
+// Those that a format holds: all, occupancy for layers of shades, colours for the others.
+std::vector<std::string> targets_of(const voxelize::format& f) {
+    if (f.has_layers) return {"occupancy"};
+    return f.all_channels ? all_targets : std::vector<std::string>{"color"};
+}
+
+// A grid has some MiB to some tens of them.
 std::vector<needs> all_needs() {
     std::vector<needs> all;
     for (const voxelize::format& f : voxelize::formats())
-        for (const std::string& wanted : f.all_channels ? all_targets : std::vector<std::string>{"color"}) {
+        for (const std::string& wanted : targets_of(f)) {
             const bool is_bits = wanted == "occupancy";
             if (!f.only_sparse)
                 all.push_back({std::string(f.extension), wanted, "--dense", is_bits ? 600 : dense_resolution});

@@ -36,6 +36,7 @@ TEST(ToolStreams, StandardOutputHasTheBytesOfTheFile) {
     const std::string model = put_cube(folder);
     std::vector<std::string> options{"-r", "6", "--image-size", "32x24"};
     for (const voxelize::format& f : voxelize::formats()) {
+        if (f.has_layers) continue; // named by {z} in a file's name, of which FORMAT:- has none
         const std::string name(f.extension.substr(1));
         std::vector<std::string> arguments{model, "-o", name + ":-", "--stats"};
         arguments.insert(arguments.end(), options.begin(), options.end());
