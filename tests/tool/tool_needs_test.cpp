@@ -119,13 +119,13 @@ constexpr int dense_resolution = 112, sparse_resolution = 200;
 const std::vector<double> multiples{1.0, 1.5, 2.0};
 #endif
 
-// Those that a format holds: all, occupancy for layers of shades, colours for the others.
+// Those that a format holds: all, one share for layers of shades, colours for the others.
 std::vector<std::string> targets_of(const voxelize::format& f) {
-    if (f.has_layers) return {"occupancy"};
+    if (f.has_layers) return {"fraction"};
     return f.all_channels ? all_targets : std::vector<std::string>{"color"};
 }
 
-// A grid has some MiB to some tens of them.
+// A grid has some MiB to some tens of them. Fractions are dense.
 std::vector<needs> all_needs() {
     std::vector<needs> all;
     for (const voxelize::format& f : voxelize::formats())
@@ -133,7 +133,8 @@ std::vector<needs> all_needs() {
             const bool is_bits = wanted == "occupancy";
             if (!f.only_sparse)
                 all.push_back({std::string(f.extension), wanted, "--dense", is_bits ? 600 : dense_resolution});
-            all.push_back({std::string(f.extension), wanted, "--sparse", is_bits ? 1000 : sparse_resolution});
+            if (wanted != "fraction")
+                all.push_back({std::string(f.extension), wanted, "--sparse", is_bits ? 1000 : sparse_resolution});
         }
 #ifdef VOXELPIPE_ALL_NEEDS
     all.push_back({".npy", "fraction", "--dense", dense_resolution});
