@@ -45,6 +45,18 @@ is_outside = labels == labels[0, 0, 0]  # without cavities in the body, which no
 
 assert np.array_equal(is_outside, ~is_wall)  # this body has none
 
+# snippet: boundaries
+cells = vp.fractions(body, grid, of=("fraction", "aperture_x", "aperture_y", "aperture_z", "area_vector"))
+fluid_volume = 1 - cells["fraction"]  # float32, (nz, ny, nx)
+fluid_faces = 1 - cells["aperture_x"]  # float64, (nz, ny, nx + 1): the lower face of voxel i, and the last one's upper
+wall = cells["area_vector"]  # float64, (nz, ny, nx, 3), in world units; out of the body, into the fluid
+# end snippet
+
+assert np.abs(wall.sum(axis=(0, 1, 2))).max() < 1e-9 and 0 <= fluid_faces.min() and fluid_faces.max() <= 1
+assert np.array_equal(np.diff(fluid_faces, axis=2) * 0.25**2, wall[..., 0])  # to the last bit
+area = np.linalg.norm(wall, axis=-1).sum()
+assert abs(area / (4 * np.pi * 9) - 1) < 0.01 and abs(fluid_volume.sum() / (32**3 - 36 * np.pi * 64) - 1) < 1e-3
+
 # snippet: densities
 materials = {"lead": 11.35, "polyethylene": 0.94}  # g/cm³
 bodies = [ball((-1.5, 0, 0), 1.2), ball((1.25, 0, 0), 1.55)]

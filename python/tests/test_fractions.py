@@ -55,10 +55,78 @@ def test_bodies_add_up_or_stay_apart():
     assert np.array_equal(vp.fractions((vertices, np.asarray(triangles)[:, ::-1]), GRID), -each[0])
 
 
+def test_faces_of_a_box_are_its_overlaps():
+    low, high, status = (0.625, 0.375, 1.25), (5.875, 3.0625, 6.5), {}
+    names = ("fraction", "aperture_x", "aperture_y", "aperture_z", "area_vector")
+    cells = vp.fractions(box(low, high), GRID, of=names, status=status)
+    assert tuple(cells) == names and status["open_rows"] == 0
+    assert np.array_equal(cells["fraction"], vp.fractions(box(low, high), GRID))
+    area = np.zeros(3)
+    for axis, name in enumerate(names[1:4]):
+        faces = cells[name]
+        shape = list(GRID.shape)
+        shape[2 - axis] += 1
+        assert faces.dtype == np.float64 and faces.shape == tuple(shape)
+        # The faces inside lie where the plane is within the box, and are overlaps of the two other axes.
+        planes = GRID.origin[axis] + GRID.voxel_size[axis] * np.arange(shape[2 - axis])
+        wide_low, wide_high = list(low), list(high)
+        wide_low[axis], wide_high[axis] = -100, 100
+        across = box_fractions(GRID, wide_low, wide_high).take(0, axis=2 - axis)
+        inside = (planes > low[axis]) & (planes <= high[axis])
+        expected = np.expand_dims(across, 2 - axis) * inside.reshape([-1 if a == 2 - axis else 1 for a in range(3)])
+        assert np.array_equal(faces, expected)
+        # Discrete Gauss, to the last bit: the sizes are powers of two.
+        face = np.prod(GRID.voxel_size) / GRID.voxel_size[axis]
+        assert np.array_equal(cells["area_vector"][..., axis], -np.diff(faces, axis=2 - axis) * face)
+        area[axis] = np.abs(cells["area_vector"][..., axis]).sum()
+    size = np.subtract(high, low)
+    assert np.array_equal(area, 2 * np.prod(size) / size)
+
+
+def test_faces_of_crops_and_bodies_and_the_last_faces():
+    # The first box leaves the grid at its high ends, where the last faces are inside.
+    a, b = ((0.5, 0.25, 1), (9, 9, 12)), ((0.5, 1, 2), (2, 4, 8))
+    names = ["area_vector", "aperture_z", "aperture_x", "aperture_y"]
+    whole = vp.fractions([box(*a), box(*b)], GRID, of=names)
+    each = vp.fractions([box(*a), box(*b)], GRID, of=names, bodies="each")
+    for name in names:
+        assert np.array_equal(whole[name], each[name].sum(axis=0))
+    assert (each["aperture_x"][0, 1:, 1:, -1] == 1).all() and (each["aperture_z"][0, -1, 1:, 1:] == 1).all()
+    assert (each["aperture_y"][0, 1:, -1, 1:] == 1).all() and not whole["aperture_x"][..., 0].any()
+    part = vp.fractions([box(*a), box(*b)], GRID.crop((1, 3, 2), (6, 9, 4)), of=names)
+    where = np.s_[1:7, 3:12, 2:6]
+    assert np.array_equal(part["area_vector"], whole["area_vector"][where])
+    for axis, name in enumerate(("aperture_x", "aperture_y", "aperture_z")):
+        stop = [s.stop + (2 - axis == n) for n, s in enumerate(where)]
+        assert np.array_equal(part[name], whole[name][tuple(slice(s.start, e) for s, e in zip(where, stop))])
+    alone = vp.fractions([box(*a), box(*b)], GRID, of="aperture_y")
+    assert np.array_equal(alone, whole["aperture_y"])
+
+
+def test_area_of_a_sphere():
+    mesh = sphere()
+    grid = vp.fit(mesh, 20)
+    cells = vp.fractions(mesh, grid, of=("area_vector", "aperture_y"), threads=1)
+    for name, values in vp.fractions(mesh, grid, of=("area_vector", "aperture_y"), threads=2).items():
+        assert cells[name].tobytes() == values.tobytes()
+    assert np.abs(cells["area_vector"].sum(axis=(0, 1, 2))).max() < 1e-9  # a closed surface's is 0
+    vertices, triangles = mesh
+    corners = np.asarray(vertices, np.float64)[np.asarray(triangles)]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    found = np.linalg.norm(cells["area_vector"], axis=-1).sum()
+    assert 0.99 * area < found <= area * (1 + 1e-6)  # a curved part counts as its chord
+
+
 def test_open_meshes_warn_and_mistakes_are_named():
     vertices, triangles = box((1, 1, 1), (3, 3, 3))
     with pytest.warns(vp.OpenMeshWarning, match="rows of voxels do not balance"):
         vp.fractions((vertices, np.delete(triangles, 8, axis=0)), GRID)  # of the face at low x
+    with pytest.warns(vp.OpenMeshWarning, match=r" of 306 rows"):  # along x and y
+        vp.fractions((vertices, np.delete(triangles, 8, axis=0)), GRID, of=("aperture_y",), status=(status := {}))
+    assert status["open_rows"] > 0
+    for mistake in ("area", ("fraction", "aperture"), ()):
+        with pytest.raises(ValueError, match="of "):
+            vp.fractions((vertices, triangles), GRID, of=mistake)
     with pytest.raises(ValueError, match="bodies"):
         vp.fractions((vertices, triangles), GRID, bodies="some")
     with pytest.raises(TypeError, match="grid"):

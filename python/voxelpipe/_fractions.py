@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any
+from typing import Any, Sequence, overload
 
 import numpy as np
 
@@ -12,13 +12,40 @@ from ._core import Grid
 from ._distance import _host_mesh
 from ._solid import OpenMeshWarning
 from ._surface import take_counts
-from ._types import Bodies, MeshLike, check_call, check_choice
+from ._types import Bodies, CellValue, MeshLike, check_call, check_choice
+
+_APERTURES = ("aperture_x", "aperture_y", "aperture_z")
+
+
+@overload
+def fractions(
+    mesh: MeshLike,
+    grid: Grid,
+    *,
+    of: CellValue = "fraction",
+    bodies: Bodies = "all",
+    threads: int = 0,
+    status: dict[str, int] | None = None,
+) -> Any: ...
+
+
+@overload
+def fractions(
+    mesh: MeshLike,
+    grid: Grid,
+    *,
+    of: Sequence[CellValue],
+    bodies: Bodies = "all",
+    threads: int = 0,
+    status: dict[str, int] | None = None,
+) -> dict[str, Any]: ...
 
 
 def fractions(
     mesh: MeshLike,
     grid: Grid,
     *,
+    of: CellValue | Sequence[CellValue] = "fraction",
     bodies: Bodies = "all",
     threads: int = 0,
     status: dict[str, int] | None = None,
@@ -32,39 +59,78 @@ def fractions(
 
     Args:
         mesh, grid: as in voxelize(). The meshes of a list, and the parts of a model, are bodies.
-        bodies: "all", the sum over all bodies; "each", an array (n, nz, ny, nx) with the fractions of every body by itself,
-            for materials that share a voxel.
+        of: what is measured, one name for an array or a list of names for a dict of arrays:
+            "fraction": float32, (nz, ny, nx).
+            "aperture_x", "aperture_y", "aperture_z": float64, how much of every face between two voxels along the axis is
+            inside, with the grid's own two faces: (nz, ny, nx + 1), (nz, ny + 1, nx) and (nz + 1, ny, nx).
+            "area_vector": float64, (nz, ny, nx, 3), the sum of the vectors (x, y, z) of the mesh's area within the voxel,
+            outward, in world units. For voxels of size 1 it is the difference of the voxel's two apertures along each axis,
+            to the last bit; area between two voxels is the lower one's.
+        bodies: "all", the sum over all bodies; "each", arrays with one more axis in front, (n, nz, ny, nx), of every body by
+            itself, for materials that share a voxel.
         threads: 0 takes all cores. The result is the same for any number.
-        status: a dict that is filled with the call's counters, with "each" their sums over the bodies: cut_voxels that a
-            triangle's inside reaches; below_zero and above_one, voxels that are below 0 or above 1 by more than 2^-24;
-            open_rows, rows of voxels along x whose triangles do not balance; open_edges without an opposite edge.
+        status: a dict that is filled with the call's counters, those of rows along x, with "each" their sums over the
+            bodies: cut_voxels that a triangle's inside reaches; below_zero and above_one, voxels that are below 0 or above 1
+            by more than 2^-24; open_edges without an opposite edge; and open_rows, rows of voxels along every axis that was
+            asked for whose triangles do not balance.
 
-    Returns the fractions; a mesh of torch's tensors gives tensors. Warns with OpenMeshWarning where rows prove that the mesh
+    Returns the values; a mesh of torch's tensors gives tensors. Warns with OpenMeshWarning where rows prove that the mesh
     is not closed. Raises IndexError for a triangle that names a vertex that does not exist, TypeError for a mesh in a GPU's
-    memory.
+    memory, ValueError for a name of `of` that there is not.
 
     Example:
         >>> part = vp.fractions(mesh, grid)
         >>> volume = part.sum(dtype=np.float64) * np.prod(grid.voxel_size)
+        >>> cells = vp.fractions(mesh, grid, of=("fraction", "aperture_x", "area_vector"))
+        >>> area = np.linalg.norm(cells["area_vector"], axis=-1)  # of one plane a voxel
     """
     check_call("fractions", grid, "conservative", threads, status)
     check_choice("bodies", bodies, Bodies)
+    wanted = [of] if isinstance(of, str) else list(of)
+    for name in wanted:
+        check_choice("of", name, CellValue)
+    if not wanted:
+        raise ValueError("of names nothing to measure")
     m = _host_mesh(mesh, "fractions")
     positions, where = m.positions(grid)
     firsts = list(m.first_triangles) if bodies == "each" else [0]
     ends = firsts[1:] + [len(m.triangles)]
-    out = np.empty((len(firsts), *grid.shape), np.float32)
+    has_areas = "area_vector" in wanted
+    # Rows along x come last: the fractions and the counters are theirs.
+    axes = [axis for axis in (2, 1) if has_areas or _APERTURES[axis] in wanted] + [0]
+    out: dict[str, np.ndarray] = {"fraction": np.empty((len(firsts), *grid.shape), np.float32)}
+    if has_areas:
+        out["area_vector"] = np.zeros((len(firsts), *grid.shape, 3))
+    for axis, name in enumerate(_APERTURES):
+        if name in wanted:
+            shape = list(grid.shape)
+            shape[2 - axis] += 1
+            out[name] = np.zeros((len(firsts), *shape))
     counts: dict[str, int] = {}
-    for values, first, end in zip(out, firsts, ends):
-        of_body = _core.fractions(positions, m.triangles[first:end], where, values, threads)
+    open_rows = rows = 0
+    for body, (first, end) in enumerate(zip(firsts, ends)):
+        for axis in axes:
+            of_body = _core.fractions(
+                positions,
+                m.triangles[first:end],
+                where,
+                axis,
+                out["fraction"][body],
+                out[_APERTURES[axis]][body] if _APERTURES[axis] in out else None,
+                out["area_vector"][body] if has_areas else None,
+                threads,
+            )
+            open_rows += of_body["open_rows"]
+            rows += int(np.prod(grid.shape)) // max(grid.shape[2 - axis], 1)
         counts = {name: counts.get(name, 0) + count for name, count in of_body.items()}
+    counts["open_rows"] = open_rows
     take_counts(counts, status)
-    if counts["open_rows"]:
-        rows = len(firsts) * grid.shape[0] * grid.shape[1]
+    if open_rows:
         warnings.warn(
-            f"the mesh is not closed: {counts['open_rows']} of {rows} rows of voxels do not balance, and the fractions behind a "
+            f"the mesh is not closed: {open_rows} of {rows} rows of voxels do not balance, and the fractions behind a "
             f"hole are in doubt ({counts['open_edges']} open edges)",
             OpenMeshWarning,
             stacklevel=2,
         )
-    return m.to_caller(out if bodies == "each" else out[0])
+    results = {name: m.to_caller(out[name] if bodies == "each" else out[name][0]) for name in wanted}
+    return results[of] if isinstance(of, str) else results

@@ -18,6 +18,8 @@ Sign = Literal["nonzero", "even_odd", "positive", "unsigned"]
 Extent = Literal["outer", "centre", "center", "inner"]
 Repair = Literal["none", "close_holes", "exterior", "vote"]
 Bodies = Literal["all", "each"]
+# What fractions() measures of every voxel.
+CellValue = Literal["fraction", "area_vector", "aperture_x", "aperture_y", "aperture_z"]
 Place = Literal["corner", "mean", "sharp"]
 Border = Literal["closed", "open"]
 Blend = Literal["mean", "sum", "min", "max", "last"]
