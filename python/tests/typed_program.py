@@ -37,7 +37,7 @@ def mistakes(vertices: Array, triangles: npt.NDArray[np.int64], grid: vp.Grid) -
     vp.voxelize(mesh, 64)  # type: ignore[call-overload]
     vp.voxelize(mesh, grid, "conservativ")  # type: ignore[call-overload]
     vp.solid(mesh, grid, repair="holes")  # type: ignore[call-overload]
-    vp.fractions(mesh, grid, of="aperture")  # type: ignore[call-overload]
+    vp.fractions(mesh, grid, of="aperture")  # type: ignore[arg-type]
     vp.voxelize(5, grid)  # type: ignore[call-overload]
     vp.save("a.npy", vp.voxelize(mesh, grid), grid, nonsense=1)  # type: ignore[call-arg]
     vp.bake(mesh, grid, {"rgb": vertices}, blend="median")  # type: ignore[call-overload]
