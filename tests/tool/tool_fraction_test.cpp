@@ -174,11 +174,23 @@ TEST(Fraction, AreaVectorsArePaddedAndAddUpToNothing) {
     const scratch_folder folder;
     builder file;
     add(file, tilted);
-    const outcome whole = draw(folder, file, "o.npy", {"-t", "area_vector", "-j", "1"});
+    const outcome whole = draw(folder, file, "o.npy", {"-t", "area_vector", "-j", "3"});
     ASSERT_EQ(0, whole.code) << whole.err;
-    const outcome padded = draw(folder, file, "p.npy", {"-t", "area_vector", "-j", "3", "--padding", "1"});
-    ASSERT_EQ(0, padded.code) << padded.err;
-    EXPECT_EQ(read_file(folder / "o.npy"), read_file(folder / "p.npy"));
+    const auto areas = [&](const std::vector<std::string>& grid) {
+        std::vector<std::string> arguments{folder / "m.glb", "-o", folder / "p.npy", "-t", "area_vector"};
+        arguments.insert(arguments.end(), grid.begin(), grid.end());
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+        return read_npy(folder / "p.npy");
+    };
+    const array plain = areas({"-r", "10"}), padded = areas({"-r", "16", "--padding", "3"});
+    ASSERT_EQ(plain.shape[2] + 6, padded.shape[2]);
+    std::size_t at = 0;
+    for (std::size_t z = 0; z < plain.shape[0]; ++z)
+        for (std::size_t y = 0; y < plain.shape[1]; ++y)
+            for (std::size_t x = 0; x < 3 * plain.shape[2]; ++x)
+                ASSERT_EQ(plain.at<float>(at++),
+                          padded.at<float>(((z + 3) * padded.shape[1] + y + 3) * 3 * padded.shape[2] + x + 9));
     const array found = read_npy(folder / "o.npy");
     glm::dvec3 sum(0), sizes(0);
     for (std::size_t i = 0; i < found.voxels(); ++i) {
