@@ -192,8 +192,7 @@ nb::tuple draw_scene(const model_scene& m, const grid& g, const std::string& rul
     request.targets.clear();
     for (const std::string& name : targets) {
         const std::optional<voxelize::target> id = voxelize::target_named(name);
-        if (!id || *id == voxelize::target::distance || *id == voxelize::target::nearest ||
-            *id == voxelize::target::fraction)
+        if (!id || *id == voxelize::target::distance || *id == voxelize::target::nearest || voxelize::is_of_cells(*id))
             throw nb::value_error(("no value of a model's surface is called '" + name + "'").c_str());
         request.targets.push_back(*id);
     }

@@ -132,6 +132,78 @@ TEST(Fraction, OfABoxIsTheProductOfItsOverlaps) {
     EXPECT_EQ("cpu", stats["backend"].get<std::string>());
 }
 
+// Area of the box's sides within the voxels: for each axis the part of the voxel across it, where a side lies.
+TEST(Fraction, AreaVectorsOfABoxAreThoseOfItsSides) {
+    const scratch_folder folder;
+    builder file;
+    const glm::dvec3 low(-2.125, -1.75, -3.25), high(1.625, 2.0625, 0.25);
+    add(file, box(low, high));
+    for (const char* const targets : {"area_vector", "fraction,area_vector,occupancy"}) {
+        const bool is_alone = std::string(targets) == "area_vector";
+        const outcome result = draw(folder, file, "o.npy", {"-t", targets, "--stats", "json"});
+        ASSERT_EQ(0, result.code) << result.err;
+        EXPECT_EQ(std::string::npos, result.err.find("warning")) << result.err;
+        const array found = read_npy(folder / (is_alone ? "o.npy" : "o.area_vector.npy"));
+        EXPECT_EQ("<f4", found.type);
+        ASSERT_EQ((std::vector<std::size_t>{16, 16, 16, 3}), found.shape);
+        std::size_t i = 0;
+        for (int z = 0; z < 16; ++z)
+            for (int y = 0; y < 16; ++y)
+                for (int x = 0; x < 16; ++x)
+                    for (int axis = 0; axis < 3; ++axis) {
+                        const glm::dvec3 first = -4.0 + 0.5 * glm::dvec3(x, y, z), last = first + 0.5;
+                        const glm::dvec3 part = glm::max(glm::min(last, high) - glm::max(first, low), 0.0);
+                        // A side between two voxels is the lower one's.
+                        const auto holds = [&](double side) { return first[axis] < side && side <= last[axis]; };
+                        const double across = part[(axis + 1) % 3] * part[(axis + 2) % 3];
+                        ASSERT_EQ(static_cast<float>(across * (holds(high[axis]) - holds(low[axis]))),
+                                  found.at<float>(i++))
+                            << x << ' ' << y << ' ' << z << ' ' << axis;
+                    }
+        const json fractions = json::parse(result.out)["fractions"];
+        EXPECT_EQ(3 * 256, fractions["rows"].get<int>());
+        EXPECT_EQ(0, fractions["open_rows"].get<int>());
+        const glm::dvec3 size = (high - low) / 0.5;
+        EXPECT_EQ(size.x * size.y * size.z, fractions["volume"].get<double>());
+        if (!is_alone)
+            expect_same(library_fractions({box(low, high)}, grid_of_16()), read_npy(folder / "o.fraction.npy"));
+    }
+}
+
+TEST(Fraction, AreaVectorsArePaddedAndAddUpToNothing) {
+    const scratch_folder folder;
+    builder file;
+    add(file, tilted);
+    const outcome whole = draw(folder, file, "o.npy", {"-t", "area_vector", "-j", "3"});
+    ASSERT_EQ(0, whole.code) << whole.err;
+    const auto areas = [&](const std::vector<std::string>& grid) {
+        std::vector<std::string> arguments{folder / "m.glb", "-o", folder / "p.npy", "-t", "area_vector"};
+        arguments.insert(arguments.end(), grid.begin(), grid.end());
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+        return read_npy(folder / "p.npy");
+    };
+    const array plain = areas({"-r", "10"}), padded = areas({"-r", "16", "--padding", "3"});
+    ASSERT_EQ(plain.shape[2] + 6, padded.shape[2]);
+    std::size_t at = 0;
+    for (std::size_t z = 0; z < plain.shape[0]; ++z)
+        for (std::size_t y = 0; y < plain.shape[1]; ++y)
+            for (std::size_t x = 0; x < 3 * plain.shape[2]; ++x)
+                ASSERT_EQ(plain.at<float>(at++),
+                          padded.at<float>(((z + 3) * padded.shape[1] + y + 3) * 3 * padded.shape[2] + x + 9));
+    const array found = read_npy(folder / "o.npy");
+    glm::dvec3 sum(0), sizes(0);
+    for (std::size_t i = 0; i < found.voxels(); ++i) {
+        const glm::dvec3 v(found.at<float>(3 * i), found.at<float>(3 * i + 1), found.at<float>(3 * i + 2));
+        sum += v;
+        sizes += glm::abs(v);
+    }
+    EXPECT_GT(1e-5, glm::length(sum));
+    // The sides across x are sheared along x: their projections keep their size. No voxel has two opposite sides.
+    EXPECT_NEAR(2 * 3.6 * 2.8, sizes.x, 1e-2);
+    EXPECT_NEAR(2 * 3.3 * 3.6, sizes.z, 1e-2);
+}
+
 TEST(Fraction, OtherTargetsBesideItAreAsWithoutIt) {
     const scratch_folder folder;
     builder file;
@@ -318,6 +390,12 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
     for (const std::string bad : {"0", "-1", "1.001", "nan"})
         refused({"-t", "fraction", "--threshold", bad}, "--threshold takes a fraction above 0 and up to 1", 1, "o.msh");
     refused({"--clamp"}, "--clamp goes with --target fraction");
+    refused({"-t", "area_vector", "--clamp"}, "--clamp goes with --target fraction");
+    refused({"-t", "area_vector", "--sparse"}, "--sparse and --target area_vector");
+    refused({"-t", "area_vector", "--resume"}, "--target area_vector is one piece of work");
+    refused({"-t", "area_vector"}, "beside --target area_vector adds the inside", 1, "o.nvdb");
+    refused({"-t", "area_vector"}, "slices hold one target, which is occupancy or fraction", 1, "{z}.png");
+    refused({"-t", "area_vector", "--backend", "cuda"}, "--target area_vector is drawn on the CPU alone", 5);
     refused({"-t", "fraction", "--backend", "cuda"}, "on the CPU alone", 5);
     const outcome large =
         run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", "fraction", "-r", "1000", "--max-memory", "300"});

@@ -44,10 +44,9 @@ public:
         // A flood is compared with the surface, to tell whether anything is enclosed.
         draws_surface_ = request.solid ? request.solid->rule == solid_rule::exterior : request.targets.empty();
         for (const target wanted : request.targets)
-            draws_surface_ =
-                draws_surface_ ||
-                (request.solid ? wanted != target::occupancy && wanted != target::count && wanted != target::fraction
-                               : wanted != target::fraction);
+            draws_surface_ = draws_surface_ || (request.solid ? wanted != target::occupancy &&
+                                                                    wanted != target::count && !is_of_cells(wanted)
+                                                              : !is_of_cells(wanted));
         // The bits of all voxels decide what the sides of the grid see and what lies inside.
         keeps_bits_ = request.solid ? draws_surface_ : wants(target::occupancy) || wants(target::color_outer);
         if (request.solid) bits_name_ = "surface";
@@ -56,9 +55,9 @@ public:
         if (num_lines != 0 && request.solid)
             stats.warnings.push_back(std::to_string(num_lines) +
                                      " line(s) and point(s) enclose nothing: --solid leaves them out");
-        else if (num_lines != 0 && wants(target::fraction))
-            stats.warnings.push_back(std::to_string(num_lines) +
-                                     " line(s) and point(s) enclose nothing: --target fraction leaves them out");
+        else if (num_lines != 0 && request.wants_cells())
+            stats.warnings.push_back(std::to_string(num_lines) + " line(s) and point(s) enclose nothing: --target " +
+                                     name_of_cells(request) + " leaves them out");
         keeps_bits_ = keeps_bits_ || draws_lines_; // of which the voxels are counted
         stats_.triangles = model.triangle_count();
         stats_.lines = draws_lines_ ? num_lines : 0;
@@ -125,16 +124,16 @@ public:
         if (request_.solid) {
             if (!wants(target::occupancy)) result.add_unset(inside_name_, scalar::bit);
             const double voxel_bytes = 0.125 + (counts_bodies() ? sizeof(std::uint32_t) : 0);
-            const int slabs = for_each_slab(
-                0, layers, slab_depth(voxel_bytes), [&](const voxelpipe::grid& part, int begin, int slab, int all) {
-                    report_from(num_passes() - (wants(target::fraction) ? 2 : 1), slab, all);
-                    draw_solid(result, part, begin);
-                });
+            const int slabs = for_each_slab(0, layers, slab_depth(voxel_bytes),
+                                            [&](const voxelpipe::grid& part, int begin, int slab, int all) {
+                                                report_from(num_passes() - (request_.wants_cells() ? 2 : 1), slab, all);
+                                                draw_solid(result, part, begin);
+                                            });
             if (!draws_surface_) stats_.slabs = slabs;
             finish_solid(result);
         }
         if constexpr (memory_access<Backend>::on_host)
-            if (wants(target::fraction)) draw_fractions(result);
+            if (request_.wants_cells()) draw_cells(result);
         result.channels.erase(result.channels.begin() + static_cast<std::ptrdiff_t>(request_.targets.size()),
                               result.channels.end());
         return result;
@@ -237,10 +236,10 @@ protected: // sparse_pipeline draws the same into bricks
         return slabs;
     }
 
-    // Surface, outer colours, solid, fractions.
+    // Surface, outer colours, solid, cut cells.
     [[nodiscard]] int num_passes() const {
         return (draws_surface_ ? 1 : 0) + (wants(target::color_outer) ? 1 : 0) + (request_.solid ? 1 : 0) +
-               (wants(target::fraction) ? 1 : 0);
+               (request_.wants_cells() ? 1 : 0);
     }
     // The bar shows one slab of a pass from here on.
     void report_from(int pass, int slab, int slabs) {
@@ -356,7 +355,7 @@ protected: // sparse_pipeline draws the same into bricks
 
     // Draws the channel of fractions into the volume itself, in one call: its sums run over whole rows, and each
     // triangle's parts are found once.
-    void draw_fractions(volume& result);
+    void draw_cells(volume& result);
 
     // Counts the covered voxels whose resolved normal is 0.
     void count_cancelled_normals(const volume& result);

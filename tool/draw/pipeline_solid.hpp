@@ -187,43 +187,83 @@ void pipeline<Backend>::examine_solid_bits(const voxelpipe::grid& whole) {
     if (status.ok()) counts.flood = status.solid.flood;
 }
 
+// Cell shader that returns the fraction, and puts the component along the rows' axis of the mesh's area within the
+// voxel into its place.
+struct fraction_and_area {
+    float* areas = nullptr; // three a voxel; null: none are wanted
+    glm::ivec3 extent{}, offset{};
+    int axis = 0;
+    double face = 1; // area of a voxel's face across the axis
+
+    vp::output<float> operator()(const vp::cell_fragment& f) const {
+        if (areas != nullptr) {
+            const glm::ivec3 p = f.voxel - offset;
+            const std::int64_t voxel = (static_cast<std::int64_t>(p.z) * extent.y + p.y) * extent.x + p.x;
+            // The units' difference is exact.
+            areas[3 * voxel + axis] =
+                static_cast<float>(static_cast<double>(f.aperture - f.next_aperture) * 0x1p-44 * face);
+        }
+        return vp::outputs(f.fraction);
+    }
+};
+
 template <class Backend>
-void pipeline<Backend>::draw_fractions(volume& result) {
-    // The surface and the solid are drawn; their working memory is freed before the fractions take theirs.
+void pipeline<Backend>::draw_cells(volume& result) {
+    // The surface and the solid are drawn; their working memory is freed before the cells take theirs.
     surface_framebuffer_.reset();
     bits_framebuffer_.reset();
     solid_framebuffer_.reset();
     outer_framebuffer_.reset();
     report_from(num_passes() - 1, 0, 1);
-    using draw = vp::draw<vp::mesh_view<>, instanced_vertex_shader, vp::fraction>;
-    std::vector<draw> draws;
-    for (const auto& d : uploaded_->bits_draws()) draws.push_back({d.mesh, d.vertex_shader, {}});
-    const glm::ivec3 extent = request_.grid.extent;
-    float* const values = channel_at<float>(result, info_of(target::fraction).name, 0);
-    const auto view = vp::framebuffer_view<vp::target<float, vp::blend::replace>>::on(extent, values);
+    const voxelpipe::grid grid = uploaded_->relative_grid();
+    fraction_and_area shader{nullptr, request_.grid.extent, grid.offset, 0, 1};
+    const auto num_voxels = static_cast<std::size_t>(result.num_voxels());
+    if (wants(target::area_vector)) {
+        shader.areas = channel_at<float>(result, info_of(target::area_vector).name, 0);
+        std::fill_n(shader.areas, 3 * num_voxels, 0.0F); // most voxels get no fragment
+    }
+    std::vector<float> scratch;
+    if (!wants(target::fraction)) scratch.resize(num_voxels);
+    float* const values =
+        scratch.empty() ? channel_at<float>(result, info_of(target::fraction).name, 0) : scratch.data();
+    const auto view = vp::framebuffer_view<vp::target<float, vp::blend::replace>>::on(shader.extent, values);
+    using draw = vp::draw<vp::mesh_view<>, instanced_vertex_shader, fraction_and_area>;
+    fraction_counts counts;
     vp::status status;
     {
         const stage_timer timer{*this, "fractions"};
-        status = vp::voxelize_cells(backend_, draws, uploaded_->relative_grid(), view);
-        check(status, request_);
+        // Rows along x come last: the fractions and the counts are theirs.
+        for (int axis = shader.areas == nullptr ? 0 : 2; axis >= 0; --axis) {
+            shader.axis = axis;
+            shader.face = grid.voxel_size[(axis + 1) % 3] * grid.voxel_size[(axis + 2) % 3];
+            std::vector<draw> draws;
+            for (const auto& d : uploaded_->bits_draws()) draws.push_back({d.mesh, d.vertex_shader, shader});
+            vp::cell_options options;
+            options.axis = axis;
+            options.count_open_edges = axis == 0;
+            status = vp::voxelize_cells(backend_, draws, grid, view, options);
+            check(status, request_);
+            counts.open_rows += status.cells.open_rows;
+            counts.rows += static_cast<std::uint64_t>(shader.extent[(axis + 1) % 3]) *
+                           static_cast<std::uint64_t>(shader.extent[(axis + 2) % 3]);
+        }
         if (request_.clamp)
             memory_access<Backend>::read(
-                backend_, values, static_cast<std::size_t>(result.num_voxels()),
-                [values](std::size_t i) { return std::clamp(values[i], 0.0F, 1.0F); }, thread_count(request_.threads));
+                backend_, values, num_voxels, [values](std::size_t i) { return std::clamp(values[i], 0.0F, 1.0F); },
+                thread_count(request_.threads));
     }
     if (!draws_surface_ && !request_.solid) { // otherwise these are counts of what was drawn before
         stats_.triangles_dropped = status.counts.triangles_dropped();
         add_counts(status);
         stats_.slabs = 1;
     }
-    stats_.fractions = fraction_counts{status.cells.volume(),
-                                       status.cells.cut_voxels,
-                                       status.cells.below_zero,
-                                       status.cells.above_one,
-                                       static_cast<std::uint64_t>(extent.y) * static_cast<std::uint64_t>(extent.z),
-                                       status.cells.open_rows,
-                                       status.cells.open_edges};
-    for (std::string& warning : fraction_warnings(*stats_.fractions, request_.clamp))
+    counts.volume = status.cells.volume();
+    counts.cut_voxels = status.cells.cut_voxels;
+    counts.below_zero = status.cells.below_zero;
+    counts.above_one = status.cells.above_one;
+    counts.open_edges = status.cells.open_edges;
+    stats_.fractions = counts;
+    for (std::string& warning : fraction_warnings(counts, request_.clamp || !wants(target::fraction)))
         stats_.warnings.push_back(std::move(warning));
     report_(1.0);
 }

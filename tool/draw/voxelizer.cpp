@@ -41,22 +41,23 @@ struct scene_bytes {
 scene_bytes bytes_of(const scene& model, const voxelize_request& request) {
     bool shaded = false;
     for (const target id : request.targets)
-        shaded = shaded || (id != target::occupancy && id != target::count && id != target::fraction);
+        shaded = shaded || (id != target::occupancy && id != target::count && !is_of_cells(id));
     for (const material& m : model.materials) shaded = shaded || m.alpha == alpha_mode::mask;
     const auto vertices = static_cast<double>(model.vertex_count());
     return {vertices * sizeof(vp::core::snapped_position), shaded ? vertices * sizeof(surface_varyings) : 0,
             static_cast<double>(model.triangle_count()) * 24, static_cast<double>(model.line_count()) * 128};
 }
 
-// Bytes of drawing fractions beside the result, after the other targets: snapped vertices and triangles; and the edges
+// Bytes of drawing cut cells beside the result, after the other targets: snapped vertices and triangles; and the edges
 // that are sorted, or the pairs of a triangle and a voxel that meet, of a surface somewhat larger than that of the
-// grid.
+// grid. Area vectors alone are drawn beside fractions that nobody keeps.
 double fraction_bytes(const voxelize_request& request, double vertices, double triangles) {
-    if (!request.wants(target::fraction)) return 0;
+    if (!request.wants_cells()) return 0;
     const glm::dvec3 n(request.grid.extent);
     constexpr double triangle_bytes = 36, edges_bytes = 72, pair_bytes = 56;
     const double pairs = 2 * triangles + 2.5 * (n.x * n.y + n.y * n.z + n.z * n.x);
-    return sizeof(vp::core::snapped_position) * vertices + triangle_bytes * triangles +
+    const double scratch = request.wants(target::fraction) ? 0 : sizeof(float) * n.x * n.y * n.z;
+    return scratch + sizeof(vp::core::snapped_position) * vertices + triangle_bytes * triangles +
            std::max(edges_bytes * triangles, pair_bytes * pairs);
 }
 double fraction_bytes(const scene& model, const voxelize_request& request) {
@@ -82,11 +83,11 @@ result_bytes result_of(const voxelize_request& request) {
     return bytes;
 }
 
-// Bytes of a voxel while it is drawn. Fractions are drawn into the result.
+// Bytes of a voxel while it is drawn. Cut cells are drawn into the result.
 double drawn_bytes(std::span<const target> targets) {
     double bytes = 0;
     for (const target id : targets) {
-        if (id == target::fraction) continue;
+        if (is_of_cells(id)) continue;
         const double value = static_cast<double>(size_of(info_of(id).type)) * info_of(id).components;
         bytes += id == target::color ? 20 : id == target::color_outer ? 8 : std::max(value, 0.125);
     }
@@ -250,11 +251,10 @@ volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_st
         voxelize_request inside = request;
         inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
         if (inside.solid) inside.solid->is_whole = true;
-        const bool only_cpu =
-            request.wants(target::fraction) || (request.solid && request.solid->fill == solid_fill::nearest);
+        const bool only_cpu = request.wants_cells() || (request.solid && request.solid->fill == solid_fill::nearest);
         if (only_cpu)
             require_cpu(request,
-                        std::string(request.wants(target::fraction) ? "--target fraction" : "--fill nearest") +
+                        (request.wants_cells() ? "--target " + name_of_cells(request) : "--fill nearest") +
                             " is drawn on the CPU alone",
                         stats);
         if (request.backend != backend_choice::cpu && !only_cpu)

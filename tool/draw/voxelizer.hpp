@@ -74,7 +74,14 @@ struct voxelize_request {
 
     [[nodiscard]] bool wants(target id) const { return std::find(targets.begin(), targets.end(), id) != targets.end(); }
     [[nodiscard]] bool wants_colors() const { return std::any_of(targets.begin(), targets.end(), is_color); }
+    [[nodiscard]] bool wants_cells() const { return std::any_of(targets.begin(), targets.end(), is_of_cells); }
 };
+
+// The name of the first target of cut cells, for messages.
+[[nodiscard]] inline std::string name_of_cells(const voxelize_request& request) {
+    const auto found = std::find_if(request.targets.begin(), request.targets.end(), is_of_cells);
+    return std::string(info_of(found == request.targets.end() ? target::fraction : *found).name);
+}
 
 // A volume of the grid's extent and place, without channels.
 [[nodiscard]] inline volume volume_of(const voxelpipe::grid& grid) {
@@ -94,7 +101,7 @@ struct fraction_counts {
     std::uint64_t cut_voxels = 0; // that a triangle's inside reaches
     std::uint64_t below_zero = 0; // voxels with a fraction below -2^-24
     std::uint64_t above_one = 0;  // above 1 + 2^-24
-    std::uint64_t rows = 0;       // rows of voxels along x
+    std::uint64_t rows = 0;       // rows of voxels along x, and for area vectors along y and z too
     std::uint64_t open_rows = 0;  // rows whose triangles do not balance
     std::uint64_t open_edges = 0; // edges of the snapped model that no opposite edge cancels
 };

@@ -41,7 +41,7 @@ std::vector<std::string> fraction_warnings(const fraction_counts& counts, bool c
     std::vector<std::string> warnings;
     if (counts.open_rows != 0)
         warnings.push_back("the model is not closed: " + std::to_string(counts.open_rows) + " of " +
-                           std::to_string(counts.rows) + " rows of voxels along x do not balance, and the fractions " +
+                           std::to_string(counts.rows) + " rows of voxels do not balance, and the fractions " +
                            "behind a hole are in doubt (" + std::to_string(counts.open_edges) + " open edges)");
     if (counts.below_zero + counts.above_one != 0 && !clamp)
         warnings.push_back("the fractions of " + std::to_string(counts.below_zero) +

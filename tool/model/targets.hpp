@@ -28,7 +28,8 @@ enum class target : std::uint8_t {
     depth,
     distance,
     nearest,
-    fraction
+    fraction,
+    area_vector
 };
 
 struct target_info {
@@ -59,13 +60,19 @@ inline constexpr std::array all_targets{
                 "with --distance: number of the nearest triangle; beyond the band: -1", UINT32_MAX},
     target_info{target::fraction, "fraction", scalar::f32, 1,
                 "how much of the voxel is inside, 0 to 1 if no parts overlap; see FRACTIONS"},
+    target_info{target::area_vector, "area_vector", scalar::f32, 3,
+                "sum of the area vectors of the surface in the voxel, outward; see FRACTIONS"},
 };
 
 inline constexpr std::size_t target_count = all_targets.size();
-// Those of surfaces and solids, dense and sparse. Two others go with --distance, and fractions are dense alone.
-inline constexpr std::span target_table = std::span(all_targets).first<target_count - 3>();
+// Those of surfaces and solids, dense and sparse. Two others go with --distance, and those of cut cells are dense
+// alone.
+inline constexpr std::span target_table = std::span(all_targets).first<target_count - 4>();
 
 [[nodiscard]] constexpr const target_info& info_of(target id) { return all_targets[static_cast<std::size_t>(id)]; }
+
+// What is measured of the whole of each triangle: the values of cut cells.
+[[nodiscard]] constexpr bool is_of_cells(target id) { return id == target::fraction || id == target::area_vector; }
 
 [[nodiscard]] constexpr bool is_color(target id) { return info_of(id).name.starts_with("color"); }
 

@@ -43,7 +43,7 @@ double milliseconds_since(clock::time_point start) {
 // CUDA, starting already where it will be used or may be.
 std::shared_ptr<cuda_start> start_cuda(const command_line& options) {
     if (!built_with_cuda() || options.voxelize.backend == backend_choice::cpu || options.voxelize.distance ||
-        options.voxelize.remesh || options.voxelize.wants(target::fraction))
+        options.voxelize.remesh || options.voxelize.wants_cells())
         return nullptr;
     std::error_code error;
     const std::uintmax_t bytes = std::filesystem::file_size(options.input, error);
@@ -251,8 +251,9 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     if (!stream && model.triangle_count() == 0 && (options.voxelize.solid || options.voxelize.remesh))
         refuse(std::string("there are only lines and points, which enclose nothing: ") +
                (options.voxelize.solid ? "--solid" : "--remesh") + " needs triangles");
-    if (!stream && model.triangle_count() == 0 && options.voxelize.wants(target::fraction))
-        refuse("there are only lines and points, which enclose nothing: --target fraction needs triangles");
+    if (!stream && model.triangle_count() == 0 && options.voxelize.wants_cells())
+        refuse("there are only lines and points, which enclose nothing: --target " + name_of_cells(options.voxelize) +
+               " needs triangles");
     if (elements > UINT32_MAX)
         refuse("there are " + std::to_string(elements) + " triangles, lines and points, more than the " +
                std::to_string(UINT32_MAX) + " that can be numbered");
@@ -376,8 +377,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
 // than LOADED_ROOM when it is loaded, on the CPU. folder: for temporary files. Throws as open_stream() does.
 opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder, double loaded_room) {
     const voxelize_request& request = options.voxelize;
-    const bool needs_dense =
-        request.wants(target::fraction) || (request.solid && request.solid->fill == solid_fill::nearest);
+    const bool needs_dense = request.wants_cells() || (request.solid && request.solid->fill == solid_fill::nearest);
     const bool is_drawn_here =
         !request.distance && !request.remesh && !needs_dense && request.backend != backend_choice::cuda &&
         request.strategy == voxelpipe::strategy::automatic && options.storage != storage_choice::dense;

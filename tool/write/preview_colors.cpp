@@ -6,6 +6,7 @@
 #include <voxelpipe/core/half.hpp>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -163,9 +164,13 @@ rgb8 voxel_colors::of(std::int64_t number) const {
                 std::to_integer<std::uint8_t>(from[2])};
     }
     case kind::direction: {
+        std::array<double, 3> v{};
+        for (std::size_t a = 0; a < 3; ++a) v[a] = value_of(*shown_, number, static_cast<int>(a));
+        const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+        const bool is_unit = std::abs(length - 1) < 1e-3 || length == 0; // a normal is shown as it is
         rgb8 color{};
         for (std::size_t a = 0; a < 3; ++a) {
-            const double value = value_of(*shown_, number, static_cast<int>(a));
+            const double value = is_unit ? v[a] : v[a] / length;
             color[a] =
                 static_cast<std::uint8_t>(127.5 + 127.5 * (std::isnan(value) ? 0 : std::clamp(value, -1.0, 1.0)));
         }

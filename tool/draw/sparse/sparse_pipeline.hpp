@@ -278,6 +278,7 @@ private:
             case target::distance: // those of --distance alone, which draws no bricks
             case target::nearest:
             case target::fraction: // of dense grids alone
+            case target::area_vector:
                 break;
             }
         }

@@ -376,33 +376,34 @@ void understand_fractions(command_line& options, const raw_options& raw) {
     if (!request.wants(target::fraction)) {
         if (request.clamp) throw usage_error("--clamp goes with --target fraction");
         if (raw.threshold) throw usage_error("--threshold goes with --target fraction");
-        return;
+        if (!request.wants_cells()) return;
     }
-    const std::string together = " and --target fraction do not go together: ";
-    if (raw.coverage) throw usage_error("--coverage" + together + "a fraction is of the voxel's volume");
+    const std::string name = "--target " + name_of_cells(request), together = " and " + name + " do not go together: ";
+    if (raw.coverage) throw usage_error("--coverage" + together + "a voxel's whole volume is measured");
     if (request.solid) {
         if (request.solid->rule != solid_rule::nonzero)
             throw usage_error(std::string("--solid ") + to_string(request.solid->rule) + together +
-                              "a fraction is the mean of winding numbers, as they are. --solid nonzero beside it "
+                              "a voxel is measured by winding numbers, as they are. --solid nonzero beside it "
                               "decides on the other targets");
-        if (request.solid->vote) throw usage_error("--vote" + together + "a fraction is the mean of winding numbers");
+        if (request.solid->vote) throw usage_error("--vote" + together + "a voxel is measured by winding numbers");
         if (request.solid->close_holes != 0)
             throw usage_error("--close-holes" + together + "lids would close the solid alone");
     }
     if (request.alpha == blend_alpha::cutoff)
         throw usage_error("--alpha cutoff" + together + "what is inside follows from whole triangles");
     if (options.storage == storage_choice::sparse)
-        throw usage_error("--sparse" + together + "fractions are drawn into a dense grid");
+        throw usage_error("--sparse" + together + "cut cells are drawn into a dense grid");
     if (options.by_slabs)
-        throw usage_error("--target fraction is one piece of work: no --resume, and no processes that share a model");
-    if (options.write.levels) throw usage_error("--levels" + together + "fractions have no mip levels");
+        throw usage_error(name + " is one piece of work: no --resume, and no processes that share a model");
+    if (options.write.levels) throw usage_error("--levels" + together + "cut cells have no mip levels");
     for (const std::filesystem::path& output : options.outputs) {
         const format& f = *find_format(output);
         const bool is_chosen = f.has_threshold && raw.threshold; // by the fractions
         if ((f.only_sparse || f.has_threshold) && !is_chosen && !request.solid)
             throw usage_error('"' + output.string() +
                               "\": it holds occupied voxels alone, which are those of the surface; --solid nonzero "
-                              "beside --target fraction adds the inside" +
+                              "beside " +
+                              name + " adds the inside" +
                               (f.has_threshold ? ", --threshold takes voxels by their fractions" : ""));
     }
 }

@@ -100,8 +100,9 @@ void with_rule(const channel& c, const F& f) {
     case target::distance: // --levels does not go with it
     case target::nearest:
         throw write_error(c.name, "distances have no levels");
-    case target::fraction: // nor with this
-        throw write_error(c.name, "fractions have no levels");
+    case target::fraction: // nor with these
+    case target::area_vector:
+        throw write_error(c.name, "cut cells have no levels");
     }
 }
 
