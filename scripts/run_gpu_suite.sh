@@ -137,7 +137,7 @@ build_suite() {
     local folder=$1
     shift
     [[ $step != run ]] || return 0
-    cmake -S . -B "build/$folder" -G Ninja -DCMAKE_BUILD_TYPE=Release -DVOXELPIPE_ENABLE_CUDA=ON \
+    cmake -S . -B "build/$folder" -G Ninja -DCMAKE_BUILD_TYPE=Release -DVOXELPIPE_ENABLE_CUDA=ON -DVOXELPIPE_BUILD_TESTS=ON \
         -DVOXELPIPE_BUILD_SAMPLES="${samples:-OFF}" -DVOXELPIPE_BUILD_BENCH=OFF -DCMAKE_CUDA_ARCHITECTURES="$architecture" \
         -DCMAKE_CUDA_FLAGS="$* ${VOXELPIPE_CUDA_FLAGS:-}" ${CMAKE_PREFIX_PATH:+-DCMAKE_PREFIX_PATH="$CMAKE_PREFIX_PATH"} \
         $([[ -d .deps ]] && printf -- '-DCMAKE_PREFIX_PATH=%s/.deps' "$root") >"build/configure-$folder.log" 2>&1 ||

@@ -37,7 +37,7 @@ printf 'the module probe touches %d files outside its folders, at most %d:\n%s\n
 scripts/check_includes.py
 scripts/check_documents.py
 cmake -S . -B "../build" -G Ninja -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O0 -DVOXELPIPE_EMULATE_DEVICE=ON \
-    -DVOXELPIPE_ENABLE_CUDA=OFF -DVOXELPIPE_ENABLE_MPI=OFF -DVOXELPIPE_BUILD_BENCH=OFF -DVOXELPIPE_TEST_PCH=OFF \
+    -DVOXELPIPE_ENABLE_CUDA=OFF -DVOXELPIPE_ENABLE_MPI=OFF -DVOXELPIPE_BUILD_TESTS=ON -DVOXELPIPE_TEST_PCH=OFF \
     -DVOXELPIPE_WERROR=ON "$@"
 cmake --build ../build --target probe_test emulated_probe -j "${VOXELPIPE_JOBS:-$(nproc)}"
 ctest --test-dir ../build --no-tests=error --output-on-failure -R '^(probe_test\.|emulated\.probe$)' | tee ../ctest.log
