@@ -29,6 +29,10 @@ if(TARGET voxelpipe_cuda_kernels)
   install(EXPORT voxelpipe-cuda-kernels-targets NAMESPACE voxelpipe:: DESTINATION "${voxelpipe_config_dir}" COMPONENT cuda_kernels)
 endif()
 
+if(TARGET voxelize)
+  install(TARGETS voxelize RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT tool)
+endif()
+
 configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/voxelpipe-config.cmake.in"
                               "${PROJECT_BINARY_DIR}/voxelpipe-config.cmake" INSTALL_DESTINATION "${voxelpipe_config_dir}")
 write_basic_package_version_file("${PROJECT_BINARY_DIR}/voxelpipe-config-version.cmake" COMPATIBILITY SameMinorVersion
