@@ -17,10 +17,13 @@
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/solid/core/holes.hpp>
 
+#include <glm/vec3.hpp>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -138,13 +141,29 @@ public:
     [[nodiscard]] body_map find_in(const voxelpipe::grid& part) const;
 
 private:
+    // What the drawn vertices lie in; low > high where there are none.
+    struct box {
+        glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
+    };
+    // Draws of one body that follow each other, which are found at once.
+    struct run {
+        std::size_t first, end; // draws
+        voxelpipe::grid part;   // that holds all voxels of theirs
+        bool is_small;          // no work for several threads
+    };
     void add_draw(const primitive& of, const placed_vertex_shader& place, bool mirrors);
+    void measure(); // the boxes of draws_
+    // Without those that have no voxel in PART.
+    [[nodiscard]] std::vector<run> runs_in(const voxelpipe::grid& part) const;
+    // Keys, masks and tiles of the voxels.
+    [[nodiscard]] sparse_volume find(const run& bodies, int threads) const;
 
     const voxelize_request& request_;
     std::vector<body> values_;
     std::vector<std::uint32_t> numbers_; // of values, by draw
     bool leaves_voxels_ = false;
     std::vector<draw> draws_;
+    std::vector<box> boxes_;                                  // of draws_
     std::vector<primitive> parts_;                            // connected parts in place of the draw
     std::vector<placed_vertex_shader> places_;                // of draws_ that are made here
     std::vector<std::vector<glm::uvec3>> mirrored_triangles_; // likewise
