@@ -40,6 +40,14 @@ vp::solid_options acceptance_of(const solid_request& request) {
     return options;
 }
 
+// The instances that have triangles.
+std::vector<const instance*> shown_in(const scene& model) {
+    std::vector<const instance*> shown;
+    for (const instance& i : model.instances)
+        if (!model.primitives[i.primitive].triangles.empty()) shown.push_back(&i);
+    return shown;
+}
+
 bool is_before(std::uint64_t a, std::uint32_t group_of_a, std::uint64_t b, std::uint32_t group_of_b) {
     return a != b ? a < b : group_of_a < group_of_b;
 }
@@ -61,6 +69,19 @@ bool needs_mean(const voxelize_request& request, std::span<const material> mater
     if (!request.solid || !request.wants_colors()) return false;
     return request.solid->fill == solid_fill::mean ||
            (request.solid->fill == solid_fill::body && leaves_voxels(*request.solid, request.alpha, materials));
+}
+
+bool fills_bodies(const voxelize_request& request) {
+    return request.solid && request.solid->fill == solid_fill::body &&
+           (request.wants_colors() || request.wants(target::material));
+}
+
+const instance* instance_of_parts(const scene& model, const voxelize_request& request) {
+    if (!fills_bodies(request) || request.solid->bodies != nullptr || !request.wants_colors()) return nullptr;
+    const std::vector<const instance*> shown = shown_in(model);
+    if (shown.size() != 1) return nullptr;
+    const primitive& only = model.primitives[shown.front()->primitive];
+    return only.colors.empty() && only.texcoords.empty() ? nullptr : shown.front();
 }
 
 // ---- the map --------------------------------------------------------------------------------------------------------
@@ -198,26 +219,24 @@ model_bodies::model_bodies(const scene& model, const voxelize_request& request) 
     if (request.solid->bodies != nullptr) {
         of_draws = request.solid->bodies->bodies;
     } else {
-        std::vector<const instance*> shown;
-        for (const instance& i : model.instances)
-            if (!model.primitives[i.primitive].triangles.empty()) shown.push_back(&i);
+        const std::vector<const instance*> shown = shown_in(model);
         std::vector<body_color> colors(model.primitives.size());
         if (request.wants_colors()) colors = colors_of(model, request);
         for (const instance* i : shown)
             of_draws.push_back(
                 {colors[i->primitive], static_cast<std::int32_t>(model.primitives[i->primitive].material)});
-        const primitive* const only = shown.size() == 1 ? &model.primitives[shown.front()->primitive] : nullptr;
-        if (only != nullptr && request.wants_colors() && (!only->colors.empty() || !only->texcoords.empty())) {
-            std::vector<primitive> parts = connected_parts(*only);
+        if (const instance* const whole = instance_of_parts(model, request)) {
+            const primitive& only = model.primitives[whole->primitive];
+            std::vector<primitive> parts = connected_parts(only);
             std::vector<body> of_parts;
             for (const body_color& color : colors_of(parts, model, request))
-                of_parts.push_back({color, static_cast<std::int32_t>(only->material)});
+                of_parts.push_back({color, static_cast<std::int32_t>(only.material)});
             if (!of_parts.empty() && of_parts != std::vector(of_parts.size(), of_parts.front())) {
                 of_draws = std::move(of_parts);
                 parts_ = std::move(parts);
                 places_.reserve(parts_.size());
                 mirrored_triangles_.reserve(parts_.size());
-                const affine& to_world = shown.front()->to_world;
+                const affine& to_world = whole->to_world;
                 for (const primitive& p : parts_)
                     add_draw(p, {to_world, reference_point(request.grid)}, to_world.mirrors());
             } else if (!of_parts.empty()) { // otherwise no triangle can be drawn
@@ -343,7 +362,7 @@ body_map model_bodies::find_in(const voxelpipe::grid& part) const {
     body_map made;
     made.values_ = values_;
     made.leaves_voxels_ = leaves_voxels_;
-    made.is_everywhere_ = values_.size() == 1 && !leaves_voxels_;
+    made.is_everywhere_ = is_everywhere();
     if (made.is_everywhere_) return made;
     const int threads = thread_count(request_.threads);
     const std::vector<run> runs = runs_in(part);

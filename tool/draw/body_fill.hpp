@@ -52,10 +52,17 @@ struct known_bodies {
 // True if the mean of the surface's colours may be needed.
 [[nodiscard]] bool needs_mean(const voxelize_request& request, std::span<const material> materials);
 
+// True if --fill body shows in what is asked for.
+[[nodiscard]] bool fills_bodies(const voxelize_request& request);
+// The instance whose connected parts are bodies; null where draws are, or where nothing tells parts apart.
+[[nodiscard]] const instance* instance_of_parts(const scene& model, const voxelize_request& request);
+
 // Bodies by voxel in a part of the grid, as cubes of bricks.
 class body_map {
 public:
     static constexpr std::uint32_t none = ~std::uint32_t{0};
+    // Bytes of a brick that a body's surface touches, in lists that grow.
+    static constexpr double brick_bytes = 160;
     static constexpr std::size_t brick_voxels = voxelpipe::core::sparse_brick_voxels;
     using labels = std::array<std::uint32_t, brick_voxels>; // by the Morton order of voxels
 
@@ -137,6 +144,8 @@ public:
     // Makes the draws from the scene, whose lists last as long as this.
     void make_draws(const scene& model);
 
+    // True if the first body is that of every voxel inside, so that none has to be found.
+    [[nodiscard]] bool is_everywhere() const { return values_.size() == 1 && !leaves_voxels_; }
     // The bodies in PART, a grid that is relative to the request's reference point.
     [[nodiscard]] body_map find_in(const voxelpipe::grid& part) const;
 
