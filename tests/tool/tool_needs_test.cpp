@@ -250,9 +250,9 @@ void expect_need_of(const std::string& model, const std::vector<std::string>& ho
 // which the nearest one is found.
 TEST(MemoryNeedsOfFills, AreWhatIsSaid) {
     if (sanitized) return;
-    expect_need_of("m.ply", {"--solid", "nonzero", "--fill", "body", "--dense", "-r", "80"});
-    expect_need_of("m.ply", {"--solid", "nonzero", "--fill", "body", "--sparse", "-r", "128"});
-    expect_need_of("m.ply", {"--solid", "nonzero", "--fill", "nearest", "--dense", "-r", "48"});
+    expect_need_of("m.ply", {"--solid", "nonzero", "--fill", "body", "--dense", "-r", "64"});
+    expect_need_of("m.ply", {"--solid", "nonzero", "--fill", "body", "--sparse", "-r", "96"});
+    expect_need_of("m.ply", {"--solid", "nonzero", "--fill", "nearest", "--dense", "-r", "40"});
 }
 
 TEST(MemoryNeedsOfFills, GrowWithTheirLists) {
@@ -276,7 +276,7 @@ TEST(MemoryNeedsOfFills, GrowWithTheirLists) {
 // Where voxels meet in edges alone, the sheets of a .stl stand apart, and each corner of theirs has an entry.
 TEST(MemoryNeedsOfSheets, AreWhatIsSaid) {
     if (sanitized) return;
-    expect_need_of("m.ply", {"--coverage", "thin", "--dense", "-r", "112"}, ".stl");
+    expect_need_of("m.ply", {"--coverage", "thin", "--dense", "-r", "80"}, ".stl");
 }
 
 // A run that cannot fit ends with its need before it draws anything.
