@@ -156,6 +156,47 @@ TEST(Fill, BodyIsTheFirstDrawWhoseOwnWindingAcceptsTheVoxel) {
     }
 }
 
+// Small bodies all over the grid and beyond it, whose boxes do not meet. One lacks its side at -x, so all voxels behind
+// it along +x are its own.
+TEST(Fill, SmallBodiesAreFoundWhereTheyLie) {
+    const scratch_folder folder;
+    constexpr int side = 28, step = 8;
+    std::vector<filled_box> boxes;
+    for (int z = -5; z < side; z += step)
+        for (int y = -5; y < side; y += step)
+            for (int x = -5; x < side; x += step)
+                boxes.push_back({{x, y, z}, {x + 6, y + 6, z + 6}, boxes.size() % 2 != 0});
+    filled_box& open = boxes[5 * 5 * 2 + 5 * 2 + 2]; // in the middle, of five along each axis
+    open.skipped = 2;
+    write_boxes(folder / "m.glb", boxes);
+    const filled voxels = fill(folder, folder / "m.glb", "28,28,28", {"--solid", "nonzero"});
+    std::size_t inside = 0, behind = 0;
+    for (int z = 0; z < side; ++z)
+        for (int y = 0; y < side; ++y)
+            for (int x = 0; x < side; ++x) {
+                const glm::ivec3 at(x, y, z);
+                const glm::dvec3 centre = glm::dvec3(at) + 0.5;
+                int body = -1;
+                bool is_touched = false;
+                for (std::size_t b = 0; b < boxes.size(); ++b) {
+                    is_touched = is_touched || boxes[b].touches(at);
+                    filled_box reach = boxes[b];
+                    if (&boxes[b] == &open) {
+                        reach.low.x = open.high.x;
+                        reach.high.x = side;
+                    }
+                    if (body < 0 && reach.winding(centre) != 0) body = static_cast<int>(b);
+                }
+                if (is_touched) continue;
+                ASSERT_EQ(body, voxels.material_at(at)) << x << ' ' << y << ' ' << z;
+                if (body < 0) continue;
+                ++inside;
+                if (&boxes[static_cast<std::size_t>(body)] == &open) ++behind;
+            }
+    EXPECT_LT(1000U, inside);
+    EXPECT_LT(30U, behind);
+}
+
 // Two cubes in one list of faces, of which each names vertices of its own: the one with the first vertex comes last.
 TEST(Fill, AModelOfOneDrawHasItsConnectedParts) {
     const scratch_folder folder;

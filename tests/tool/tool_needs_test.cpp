@@ -143,6 +143,9 @@ std::vector<needs> all_needs() {
     return all;
 }
 
+void expect_named_need(const scratch_folder& folder,
+                       const std::function<measured(const std::string& to, int limit)>& draw);
+
 // Runs with the named need and with multiples of it, against one without a limit.
 void expect_need(const needs& how) {
     const scratch_folder folder;
@@ -167,6 +170,12 @@ void expect_need(const needs& how) {
         if (how.extension == ".pvti") arguments.insert(arguments.end(), {"--pieces", "2"}); // which follow the limit
         return run_within(folder, arguments, limit);
     };
+    expect_named_need(folder, draw);
+}
+
+// draw(to, limit): writes into the folder `to`.
+void expect_named_need(const scratch_folder& folder,
+                       const std::function<measured(const std::string& to, int limit)>& draw) {
     const measured free = draw("free", 0);
     ASSERT_EQ(0, free.code) << free.err;
     // Room for the program and the model, and for little more.
@@ -202,6 +211,81 @@ INSTANTIATE_TEST_SUITE_P(All, MemoryNeeds, testing::ValuesIn(all_needs()),
                          [](const auto& info) { return std::to_string(info.index); });
 
 #ifndef VOXELPIPE_ALL_NEEDS
+
+// Balls of several colours, all of them one draw of a PLY: its connected parts are the bodies.
+void write_coloured_balls(const std::string& path, unsigned rings = 24) {
+    constexpr unsigned balls = 5;
+    const unsigned sides = 2 * rings;
+    const double pi = std::acos(-1.0);
+    std::ofstream file(path);
+    file << "ply\nformat ascii 1.0\nelement vertex " << balls * (rings + 1) * sides
+         << "\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
+            "property uchar blue\nelement face "
+         << balls * rings * sides << "\nproperty list uchar int vertex_indices\nend_header\n";
+    for (unsigned b = 0; b < balls; ++b)
+        for (unsigned r = 0; r <= rings; ++r)
+            for (unsigned s = 0; s < sides; ++s) {
+                const double down = pi * r / rings, around = 2 * pi * s / sides;
+                file << 1.2 * (b % 3) + std::sin(down) * std::cos(around) << ' '
+                     << 1.5 * (b / 3) + std::sin(down) * std::sin(around) << ' ' << std::cos(down) << ' ' << 50 * b
+                     << " 0 99\n";
+            }
+    for (unsigned b = 0; b < balls; ++b)
+        for (unsigned r = 0; r < rings; ++r)
+            for (unsigned s = 0; s < sides; ++s) {
+                const unsigned row = (b * (rings + 1) + r) * sides, next = (s + 1) % sides;
+                file << "4 " << row + s << ' ' << row + sides + s << ' ' << row + sides + next << ' ' << row + next
+                     << '\n';
+            }
+}
+
+// What a run of .npz, or of the format that is named last, is said to need.
+void expect_need_of(const std::string& model, const std::vector<std::string>& how,
+                    const std::string& extension = ".npz") {
+    SCOPED_TRACE(extension);
+    const scratch_folder folder;
+    write_coloured_balls(folder / model);
+    expect_named_need(folder, [&](const std::string& to, int limit) {
+        std::filesystem::create_directories(folder / to);
+        std::vector<std::string> arguments{
+            folder / model, "-o", folder / (to + "/o" + extension), "-t", "color", "-j", "2", "-q", "--backend", "cpu"};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        return run_within(folder, arguments, limit);
+    });
+}
+
+// What --fill holds is a part of the need: the connected parts and the bodies of voxels, and the tree of triangles in
+// which the nearest one is found.
+TEST(MemoryNeedsOfFills, AreWhatIsSaid) {
+    if (sanitized) return;
+    expect_need_of("m.ply", {"--solid", "nonzero", "--fill", "body", "--dense", "-r", "64"});
+    expect_need_of("m.ply", {"--solid", "nonzero", "--fill", "body", "--sparse", "-r", "96"});
+    expect_need_of("m.ply", {"--solid", "nonzero", "--fill", "nearest", "--dense", "-r", "40"});
+}
+
+TEST(MemoryNeedsOfFills, GrowWithTheirLists) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    write_coloured_balls(folder / "m.ply", 64);
+    const auto need_with = [&](const std::string& fill) {
+        const measured refused =
+            run_within(folder,
+                       {folder / "m.ply", "-o", folder / "o.npy", "-t", "color", "--solid", "nonzero", "--fill", fill,
+                        "--dense", "-r", "80", "-j", "2", "-q", "--backend", "cpu"},
+                       20);
+        EXPECT_EQ(3, refused.code) << refused.err;
+        return need_in(refused.err);
+    };
+    const int mean = need_with("mean");
+    EXPECT_LT(mean, need_with("body"));
+    EXPECT_LT(mean, need_with("nearest"));
+}
+
+// Where voxels meet in edges alone, the sheets of a .stl stand apart, and each corner of theirs has an entry.
+TEST(MemoryNeedsOfSheets, AreWhatIsSaid) {
+    if (sanitized) return;
+    expect_need_of("m.ply", {"--coverage", "thin", "--dense", "-r", "80"}, ".stl");
+}
 
 // A run that cannot fit ends with its need before it draws anything.
 void expect_early_end(const std::vector<std::string>& how, int limit, std::uint64_t address_space, double least) {

@@ -230,6 +230,22 @@ std::vector<primitive> connected_parts(const primitive& whole) {
             part_of[v] = static_cast<std::uint32_t>(parts.size());
             parts.emplace_back().material = whole.material;
         }
+    // Lists of their length, and none that grows: all parts together are as large as the whole.
+    std::vector<std::array<std::size_t, 2>> lengths(parts.size()); // vertices, triangles
+    for (const glm::uvec3& t : whole.triangles) {
+        if (!is_drawn(t)) continue;
+        std::array<std::size_t, 2>& length = lengths[part_of[find(t[0])]];
+        ++length[1];
+        for (int i = 0; i < 3; ++i)
+            if (std::exchange(vertex_in[t[i]], 0U) == none) ++length[0];
+    }
+    for (std::size_t p = 0; p < parts.size(); ++p) {
+        parts[p].triangles.reserve(lengths[p][1]);
+        parts[p].positions.reserve(lengths[p][0]);
+        if (!whole.texcoords.empty()) parts[p].texcoords.reserve(lengths[p][0]);
+        if (!whole.colors.empty()) parts[p].colors.reserve(lengths[p][0]);
+    }
+    std::fill(vertex_in.begin(), vertex_in.end(), none);
     for (const glm::uvec3& t : whole.triangles) {
         if (!is_drawn(t)) continue;
         primitive& to = parts[part_of[find(t[0])]];

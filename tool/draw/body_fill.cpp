@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "body_fill.hpp"
 
+#include "model/finite.hpp"
 #include "model/memory.hpp"
 #include "model/parallel.hpp"
 #include "solid_options.hpp"
@@ -10,6 +11,8 @@
 
 #include <algorithm>
 #include <bitset>
+#include <cmath>
+#include <map>
 #include <new>
 #include <utility>
 
@@ -37,6 +40,14 @@ vp::solid_options acceptance_of(const solid_request& request) {
     return options;
 }
 
+// The instances that have triangles.
+std::vector<const instance*> shown_in(const scene& model) {
+    std::vector<const instance*> shown;
+    for (const instance& i : model.instances)
+        if (!model.primitives[i.primitive].triangles.empty()) shown.push_back(&i);
+    return shown;
+}
+
 bool is_before(std::uint64_t a, std::uint32_t group_of_a, std::uint64_t b, std::uint32_t group_of_b) {
     return a != b ? a < b : group_of_a < group_of_b;
 }
@@ -58,6 +69,19 @@ bool needs_mean(const voxelize_request& request, std::span<const material> mater
     if (!request.solid || !request.wants_colors()) return false;
     return request.solid->fill == solid_fill::mean ||
            (request.solid->fill == solid_fill::body && leaves_voxels(*request.solid, request.alpha, materials));
+}
+
+bool fills_bodies(const voxelize_request& request) {
+    return request.solid && request.solid->fill == solid_fill::body &&
+           (request.wants_colors() || request.wants(target::material));
+}
+
+const instance* instance_of_parts(const scene& model, const voxelize_request& request) {
+    if (!fills_bodies(request) || request.solid->bodies != nullptr || !request.wants_colors()) return nullptr;
+    const std::vector<const instance*> shown = shown_in(model);
+    if (shown.size() != 1) return nullptr;
+    const primitive& only = model.primitives[shown.front()->primitive];
+    return only.colors.empty() && only.texcoords.empty() ? nullptr : shown.front();
 }
 
 // ---- the map --------------------------------------------------------------------------------------------------------
@@ -195,26 +219,24 @@ model_bodies::model_bodies(const scene& model, const voxelize_request& request) 
     if (request.solid->bodies != nullptr) {
         of_draws = request.solid->bodies->bodies;
     } else {
-        std::vector<const instance*> shown;
-        for (const instance& i : model.instances)
-            if (!model.primitives[i.primitive].triangles.empty()) shown.push_back(&i);
+        const std::vector<const instance*> shown = shown_in(model);
         std::vector<body_color> colors(model.primitives.size());
         if (request.wants_colors()) colors = colors_of(model, request);
         for (const instance* i : shown)
             of_draws.push_back(
                 {colors[i->primitive], static_cast<std::int32_t>(model.primitives[i->primitive].material)});
-        const primitive* const only = shown.size() == 1 ? &model.primitives[shown.front()->primitive] : nullptr;
-        if (only != nullptr && request.wants_colors() && (!only->colors.empty() || !only->texcoords.empty())) {
-            std::vector<primitive> parts = connected_parts(*only);
+        if (const instance* const whole = instance_of_parts(model, request)) {
+            const primitive& only = model.primitives[whole->primitive];
+            std::vector<primitive> parts = connected_parts(only);
             std::vector<body> of_parts;
             for (const body_color& color : colors_of(parts, model, request))
-                of_parts.push_back({color, static_cast<std::int32_t>(only->material)});
+                of_parts.push_back({color, static_cast<std::int32_t>(only.material)});
             if (!of_parts.empty() && of_parts != std::vector(of_parts.size(), of_parts.front())) {
                 of_draws = std::move(of_parts);
                 parts_ = std::move(parts);
                 places_.reserve(parts_.size());
                 mirrored_triangles_.reserve(parts_.size());
-                const affine& to_world = shown.front()->to_world;
+                const affine& to_world = whole->to_world;
                 for (const primitive& p : parts_)
                     add_draw(p, {to_world, reference_point(request.grid)}, to_world.mirrors());
             } else if (!of_parts.empty()) { // otherwise no triangle can be drawn
@@ -222,12 +244,13 @@ model_bodies::model_bodies(const scene& model, const voxelize_request& request) 
             }
         }
     }
+    std::map<std::pair<body_color, std::int32_t>, std::uint32_t> known;
     for (body& b : of_draws) { // what nobody asks for makes no difference
         if (!request.wants_colors()) b.color = {};
         if (!request.wants(target::material)) b.material = -1;
-        const auto known = std::find(values_.begin(), values_.end(), b);
-        numbers_.push_back(static_cast<std::uint32_t>(known - values_.begin()));
-        if (known == values_.end()) values_.push_back(b);
+        const auto [at, is_new] = known.try_emplace({b.color, b.material}, static_cast<std::uint32_t>(values_.size()));
+        numbers_.push_back(at->second);
+        if (is_new) values_.push_back(b);
     }
 }
 
@@ -247,45 +270,113 @@ void model_bodies::add_draw(const primitive& of, const placed_vertex_shader& pla
 
 void model_bodies::take_draws(std::span<const draw> draws) {
     if (parts_.empty()) draws_.assign(draws.begin(), draws.end());
+    measure();
 }
 
 void model_bodies::make_draws(const scene& model) {
-    if (!parts_.empty()) return;
-    places_.reserve(model.instances.size());
-    mirrored_triangles_.reserve(model.instances.size());
-    for (const instance& shown : model.instances) {
-        const primitive& of = model.primitives[shown.primitive];
-        if (of.triangles.empty()) continue;
-        add_draw(of, {shown.to_world, reference_point(request_.grid)}, shown.to_world.mirrors());
+    if (parts_.empty()) {
+        places_.reserve(model.instances.size());
+        mirrored_triangles_.reserve(model.instances.size());
+        for (const instance& shown : model.instances) {
+            const primitive& of = model.primitives[shown.primitive];
+            if (of.triangles.empty()) continue;
+            add_draw(of, {shown.to_world, reference_point(request_.grid)}, shown.to_world.mirrors());
+        }
     }
+    measure();
+}
+
+void model_bodies::measure() {
+    boxes_.resize(draws_.size());
+    parallel_for(draws_.size(), thread_count(request_.threads), [this](std::size_t d) {
+        const draw& of = draws_[d];
+        vp::vertex<> v{};
+        for (const glm::vec3& position : of.mesh.positions) {
+            v.position = position;
+            const glm::vec3 p = of.vertex_shader(v);
+            if (!is_finite(p)) continue; // its triangles are not drawn
+            boxes_[d].low = glm::min(boxes_[d].low, glm::dvec3(p));
+            boxes_[d].high = glm::max(boxes_[d].high, glm::dvec3(p));
+        }
+    });
+}
+
+std::vector<model_bodies::run> model_bodies::runs_in(const voxelpipe::grid& part) const {
+    // Rows and triangles that one thread draws before others could help.
+    constexpr std::uint64_t small = 1 << 16;
+    const known_bodies* const known = request_.solid->bodies;
+    const bool has_cones = known != nullptr && !known->cones.empty(); // which may reach out of a part of a body
+    std::vector<run> runs;
+    for (std::size_t first = 0, end = 0; first < draws_.size(); first = end) {
+        box around;
+        std::uint64_t work = 0;
+        for (; end < draws_.size() && numbers_[end] == numbers_[first]; ++end) {
+            around.low = glm::min(around.low, boxes_[end].low);
+            around.high = glm::max(around.high, boxes_[end].high);
+            work += draws_[end].mesh.triangles.size();
+        }
+        run made{first, end, part, false};
+        // A row along x that meets no triangle has no voxel of the body, and none of any row lies before its
+        // triangles. Behind them there may be some, where they do not close the body.
+        for (int axis = 0; axis < 3 && !has_cones; ++axis) {
+            constexpr double margin = 1; // more than what snapping moves a vertex by
+            const double most = part.extent[axis];
+            const auto voxel = [&](const glm::dvec3& p) { return part.to_voxels(p)[axis]; };
+            const int low = static_cast<int>(std::clamp(std::floor(voxel(around.low)) - margin, 0.0, most));
+            const int high = axis == 0
+                                 ? part.extent.x
+                                 : static_cast<int>(std::clamp(std::ceil(voxel(around.high)) + margin, 0.0, most));
+            made.part.offset[axis] += low;
+            made.part.extent[axis] = high - low;
+        }
+        const glm::ivec3& n = made.part.extent;
+        if (n.x <= 0 || n.y <= 0 || n.z <= 0) continue;
+        made.part.whole = part.whole_extent();
+        made.is_small = work + static_cast<std::uint64_t>(n.y) * static_cast<std::uint64_t>(n.z) <= small;
+        runs.push_back(made);
+    }
+    return runs;
+}
+
+sparse_volume model_bodies::find(const run& bodies, int threads) const {
+    vp::cpu_backend backend{static_cast<unsigned>(threads)};
+    vp::solid_options how = acceptance_of(*request_.solid);
+    const known_bodies* const known = request_.solid->bodies;
+    if (known != nullptr && !known->cones.empty()) how.cones = known->cones.data() + bodies.first;
+    std::bitset<2> enabled;
+    enabled[0] = true;
+    body_bits framebuffer(backend, bodies.part.extent, enabled);
+    const vp::status status = vp::voxelize_solid(
+        backend, std::span(draws_).subspan(bodies.first, bodies.end - bodies.first), bodies.part, framebuffer, how);
+    if (status.code == vp::status_code::out_of_memory) throw std::bad_alloc{};
+    status.or_throw();
+    const auto& from = framebuffer.contents();
+    sparse_volume voxels;
+    voxels.keys.assign(from.keys.data(), from.keys.data() + from.keys.size());
+    voxels.masks.assign(from.masks.data(), from.masks.data() + from.masks.size());
+    voxels.tiles.assign(from.tiles.data(), from.tiles.data() + from.tiles.size());
+    return voxels;
 }
 
 body_map model_bodies::find_in(const voxelpipe::grid& part) const {
     body_map made;
     made.values_ = values_;
     made.leaves_voxels_ = leaves_voxels_;
-    made.is_everywhere_ = values_.size() == 1 && !leaves_voxels_;
+    made.is_everywhere_ = is_everywhere();
     if (made.is_everywhere_) return made;
-    vp::solid_options how = acceptance_of(*request_.solid);
-    const known_bodies* const known = request_.solid->bodies;
-    vp::cpu_backend backend{static_cast<unsigned>(thread_count(request_.threads))};
-    // Draws of one body that follow each other are found at once.
-    for (std::size_t first = 0, end = 0; first < draws_.size(); first = end) {
-        while (end < draws_.size() && numbers_[end] == numbers_[first]) ++end;
-        std::bitset<2> enabled;
-        enabled[0] = true;
-        body_bits framebuffer(backend, part.extent, enabled);
-        if (known != nullptr && !known->cones.empty()) how.cones = known->cones.data() + first;
-        const vp::status status =
-            vp::voxelize_solid(backend, std::span(draws_).subspan(first, end - first), part, framebuffer, how);
-        if (status.code == vp::status_code::out_of_memory) throw std::bad_alloc{};
-        status.or_throw();
-        const auto& from = framebuffer.contents();
-        sparse_volume voxels;
-        voxels.keys.assign(from.keys.data(), from.keys.data() + from.keys.size());
-        voxels.masks.assign(from.masks.data(), from.masks.data() + from.masks.size());
-        voxels.tiles.assign(from.tiles.data(), from.tiles.data() + from.tiles.size());
-        made.add(voxels, numbers_[first]);
+    const int threads = thread_count(request_.threads);
+    const std::vector<run> runs = runs_in(part);
+    const auto add = [&](const run& bodies, const sparse_volume& voxels) { made.add(voxels, numbers_[bodies.first]); };
+    for (std::size_t first = 0, end = 0; first < runs.size(); first = end) {
+        if (!runs[first].is_small) {
+            add(runs[first], find(runs[first], threads));
+            ++end;
+            continue;
+        }
+        while (end < runs.size() && runs[end].is_small) ++end;
+        ordered_for(
+            end - first, threads, [&](std::size_t n) { return find(runs[first + n], 1); },
+            [&](std::size_t n, const sparse_volume& voxels) { add(runs[first + n], voxels); });
     }
     made.sort();
     return made;

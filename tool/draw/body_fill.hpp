@@ -17,10 +17,13 @@
 #include <voxelpipe/core/brick_table.hpp>
 #include <voxelpipe/solid/core/holes.hpp>
 
+#include <glm/vec3.hpp>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -49,10 +52,17 @@ struct known_bodies {
 // True if the mean of the surface's colours may be needed.
 [[nodiscard]] bool needs_mean(const voxelize_request& request, std::span<const material> materials);
 
+// True if --fill body shows in what is asked for.
+[[nodiscard]] bool fills_bodies(const voxelize_request& request);
+// The instance whose connected parts are bodies; null where draws are, or where nothing tells parts apart.
+[[nodiscard]] const instance* instance_of_parts(const scene& model, const voxelize_request& request);
+
 // Bodies by voxel in a part of the grid, as cubes of bricks.
 class body_map {
 public:
     static constexpr std::uint32_t none = ~std::uint32_t{0};
+    // Bytes of a brick that a body's surface touches, in lists that grow.
+    static constexpr double brick_bytes = 160;
     static constexpr std::size_t brick_voxels = voxelpipe::core::sparse_brick_voxels;
     using labels = std::array<std::uint32_t, brick_voxels>; // by the Morton order of voxels
 
@@ -134,17 +144,35 @@ public:
     // Makes the draws from the scene, whose lists last as long as this.
     void make_draws(const scene& model);
 
+    // True if the first body is that of every voxel inside, so that none has to be found.
+    [[nodiscard]] bool is_everywhere() const { return values_.size() == 1 && !leaves_voxels_; }
     // The bodies in PART, a grid that is relative to the request's reference point.
     [[nodiscard]] body_map find_in(const voxelpipe::grid& part) const;
 
 private:
+    // What the drawn vertices lie in; low > high where there are none.
+    struct box {
+        glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
+    };
+    // Draws of one body that follow each other, which are found at once.
+    struct run {
+        std::size_t first, end; // draws
+        voxelpipe::grid part;   // that holds all voxels of theirs
+        bool is_small;          // no work for several threads
+    };
     void add_draw(const primitive& of, const placed_vertex_shader& place, bool mirrors);
+    void measure(); // the boxes of draws_
+    // Without those that have no voxel in PART.
+    [[nodiscard]] std::vector<run> runs_in(const voxelpipe::grid& part) const;
+    // Keys, masks and tiles of the voxels.
+    [[nodiscard]] sparse_volume find(const run& bodies, int threads) const;
 
     const voxelize_request& request_;
     std::vector<body> values_;
     std::vector<std::uint32_t> numbers_; // of values, by draw
     bool leaves_voxels_ = false;
     std::vector<draw> draws_;
+    std::vector<box> boxes_;                                  // of draws_
     std::vector<primitive> parts_;                            // connected parts in place of the draw
     std::vector<placed_vertex_shader> places_;                // of draws_ that are made here
     std::vector<std::vector<glm::uvec3>> mirrored_triangles_; // likewise

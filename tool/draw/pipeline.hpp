@@ -64,11 +64,10 @@ public:
         if (wants(target::triangle) && stats_.triangles + num_lines > INT32_MAX)
             throw std::runtime_error("more triangles and lines than --target triangle can number");
         const stage_timer timer{*this, "upload"};
-        const bool fills_bodies = request.solid && request.solid->fill == solid_fill::body &&
-                                  (request.wants_colors() || wants(target::material));
-        if (fills_bodies) bodies_ = std::make_unique<model_bodies>(model, request); // before the scene is taken
+        if (fills_bodies(request))
+            bodies_ = std::make_unique<model_bodies>(model, request); // before the scene is taken
         uploaded_ = std::make_unique<uploaded_scene<Backend>>(backend, model, request, wanted_, draws_lines_);
-        if (fills_bodies) {
+        if (bodies_) {
             if constexpr (memory_access<Backend>::on_host)
                 bodies_->take_draws(uploaded_->bits_draws());
             else

@@ -8,12 +8,18 @@
 #include "model/targets.hpp"
 #include "write/preview.hpp"
 
+#include <voxelpipe/core/morton.hpp>
+
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <optional>
 #include <string>
+#include <utility>
 
 namespace voxelize {
 
@@ -70,27 +76,46 @@ void set_by_body(const volume& v, const channel& solid, const channel& surface, 
     const std::size_t bytes = size_of(c.type) * static_cast<std::size_t>(c.components);
     const int first_layer = offset[2] / side,
               layers = (offset[2] + static_cast<int>(v.extent[2]) - 1) / side - first_layer + 1;
+    // A bit for each of the voxels [i, i + n) of a row, of which there are no more than a brick's.
+    const auto bits_of = [&](std::int64_t i, std::int64_t n, std::int64_t j, std::int64_t k) {
+        const auto word = [&](std::int64_t w) -> std::uint64_t {
+            return v.word(solid, w, j, k) & ~v.word(surface, w, j, k);
+        };
+        std::uint64_t bits = word(i / 32);
+        if (i % 32 + n > 32) bits |= word(i / 32 + 1) << 32U;
+        return static_cast<std::uint32_t>(bits >> (i % 32)) & ((1U << n) - 1U);
+    };
     parallel_for(static_cast<std::size_t>(layers), threads, [&](std::size_t layer) {
         const int bz = first_layer + static_cast<int>(layer);
         body_map::labels each;
-        glm::ivec3 of_labels(-1); // the brick whose body is known
-        std::optional<std::uint32_t> one;
+        const auto fill_brick = [&](int bx, int by) {
+            // The brick's voxels in the volume.
+            std::array<std::int64_t, 3> low{}, high{};
+            const std::array<int, 3> brick{bx, by, bz};
+            for (std::size_t a = 0; a < 3; ++a) {
+                low[a] = std::max<std::int64_t>(brick[a] * side - offset[a], 0);
+                high[a] = std::min<std::int64_t>((brick[a] + 1) * side - offset[a], v.extent[a]);
+            }
+            bool is_known = false; // what the brick's bodies are
+            std::optional<std::uint32_t> one;
+            for (std::int64_t k = low[2]; k < high[2]; ++k)
+                for (std::int64_t j = low[1]; j < high[1]; ++j)
+                    for (std::uint32_t bits = bits_of(low[0], high[0] - low[0], j, k); bits != 0; bits &= bits - 1) {
+                        if (!std::exchange(is_known, true))
+                            one = inside.bodies()->of_brick(voxelpipe::core::morton_key(bx, by, bz), each);
+                        const std::int64_t i = low[0] + std::countr_zero(bits);
+                        const auto within = [&](std::int64_t at, std::size_t a) {
+                            return static_cast<int>(at + offset[a]) % side;
+                        };
+                        const std::uint32_t number =
+                            one ? *one : each[voxelpipe::core::morton_key(within(i, 0), within(j, 1), within(k, 2))];
+                        std::memcpy(c.data.data() + bytes * static_cast<std::size_t>(v.index(i, j, k)),
+                                    inside.of(number).data(), bytes);
+                    }
+        };
         for (int by = offset[1] / side; by * side < offset[1] + static_cast<int>(v.extent[1]); ++by)
             for (int bx = offset[0] / side; bx * side < offset[0] + static_cast<int>(v.extent[0]); ++bx)
-                for (int bit = 0; bit < side * side * side; ++bit) {
-                    const glm::ivec3 within = voxelpipe::core::morton_position(static_cast<std::uint64_t>(bit));
-                    const std::int64_t i = bx * side + within.x - offset[0], j = by * side + within.y - offset[1],
-                                       k = bz * side + within.z - offset[2];
-                    if (i < 0 || j < 0 || k < 0 || i >= v.extent[0] || j >= v.extent[1] || k >= v.extent[2]) continue;
-                    if (!v.bit(solid, i, j, k) || v.bit(surface, i, j, k)) continue;
-                    if (of_labels != glm::ivec3(bx, by, bz)) {
-                        of_labels = {bx, by, bz};
-                        one = inside.bodies()->of_brick(voxelpipe::core::morton_key(bx, by, bz), each);
-                    }
-                    const auto& value = inside.of(one ? *one : each[static_cast<std::size_t>(bit)]);
-                    std::memcpy(c.data.data() + bytes * static_cast<std::size_t>(v.index(i, j, k)), value.data(),
-                                bytes);
-                }
+                fill_brick(bx, by);
     });
 }
 

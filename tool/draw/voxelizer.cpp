@@ -65,6 +65,52 @@ double fraction_bytes(const scene& model, const voxelize_request& request) {
                           static_cast<double>(model.triangle_count()));
 }
 
+// Bytes that --fill takes.
+struct fill_bytes {
+    double held = 0;    // while the model is drawn: its connected parts
+    double made = 0;    // while these are found, before anything is drawn
+    double filling = 0; // while values are found for the voxels inside, after all is drawn
+};
+
+fill_bytes fill_bytes_of(const voxelize_request& request, double vertices, double triangles) {
+    fill_bytes bytes;
+    const glm::dvec3 n(request.grid.extent);
+    if (fills_bodies(request)) {
+        // Bricks of surfaces that are twice that of the grid, and the rows of one body that is as large as it.
+        constexpr double brick_area = 64, crossing_bytes = 64;
+        bytes.filling = body_map::brick_bytes * 4 * (n.x * n.y + n.y * n.z + n.z * n.x) / brick_area +
+                        2 * crossing_bytes * n.y * n.z + sizeof(vp::core::snapped_position) * vertices;
+    } else if (request.solid && request.solid->fill == solid_fill::nearest &&
+               (request.wants_colors() || request.wants(target::material))) {
+        // Triangles as they are placed, once more while they are sorted, and their order; those that each thread looks
+        // at for a brick, which lie within three bricks, in lists that grow; one layer of the slab whose nearest
+        // triangles and colours are found at once.
+        constexpr double triangle_bytes = 190, near_bytes = 600, near_voxels = 24, thread_bytes = 1 << 20,
+                         sample_bytes = 8, least_work = 1 << 20;
+        const double side = near_voxels / std::max({n.x, n.y, n.z});
+        const double near = triangles * std::min(1.0, side * side);
+        bytes.filling =
+            (sizeof(vp::core::snapped_position) + sizeof(surface_varyings)) * vertices + triangle_bytes * triangles +
+            thread_count(request.threads) * (thread_bytes + near_bytes * near) + least_work + sample_bytes * n.x * n.y;
+    }
+    return bytes;
+}
+fill_bytes fill_bytes_of(const scene& model, const voxelize_request& request) {
+    fill_bytes bytes =
+        fill_bytes_of(request, static_cast<double>(model.vertex_count()), static_cast<double>(model.triangle_count()));
+    if (const instance* const whole = instance_of_parts(model, request)) {
+        const primitive& of = model.primitives[whole->primitive];
+        constexpr double found_vertex_bytes = 16; // order, root, part and number
+        const auto vertices = static_cast<double>(of.positions.size());
+        const std::size_t vertex = sizeof(glm::vec3) + (of.texcoords.empty() ? 0 : sizeof(glm::vec2)) +
+                                   (of.colors.empty() ? 0 : sizeof(glm::vec4));
+        bytes.held =
+            static_cast<double>(vertex) * vertices + sizeof(glm::uvec3) * static_cast<double>(of.triangles.size());
+        bytes.made = bytes.held + found_vertex_bytes * vertices;
+    }
+    return bytes;
+}
+
 // Bytes of the result, of its largest channel once more while a ring is put around it, and of a solid's bits.
 struct result_bytes {
     double volume = 0, ring = 0, bits = 0;
@@ -118,8 +164,10 @@ volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats)
     const int threads = thread_count(request.threads);
     const scene_bytes parts = bytes_of(model, request);
     const double least = parts.vertices + volume_bytes(request);
-    const double likely = std::max(least + parts.varyings + parts.triangles + parts.lines,
-                                   volume_bytes(request) + fraction_bytes(model, request));
+    const fill_bytes fill = fill_bytes_of(model, request);
+    const double likely = fill.held + std::max({least + parts.varyings + parts.triangles + parts.lines,
+                                                volume_bytes(request) + fraction_bytes(model, request),
+                                                volume_bytes(request) + fill.filling});
     require_vertices(model, request, volume_bytes(request));
     const auto room = static_cast<double>(memory::room());
     const double likely_in_all = static_cast<double>(memory::limit()) - room + likely;
@@ -204,15 +252,16 @@ volume with_ring(volume inside, const voxelize_request& request) {
 namespace {
 
 // Bytes beyond those of the model's vertices and triangles: `parts` are those, `fractions` with those of fractions.
-double dense_need_beside(const voxelize_request& request, double parts, double fractions) {
+double dense_need_beside(const voxelize_request& request, double parts, double fractions, const fill_bytes& fill) {
     const auto [volume, ring, bits] = result_of(request);
     // A slab of one layer, and each thread's tile with its sums.
     constexpr double least_work = 1 << 20, thread_bytes = 1 << 20, tile_voxels = 32768, sums = 2.5;
     const double voxel = drawn_bytes(request.targets);
     const double threads = thread_count(request.threads) * (thread_bytes + tile_voxels * (sums * voxel + 8));
     const double layer = voxel * request.grid.extent.x * request.grid.extent.y;
-    return volume +
-           std::max({ring, bits + parts + least_work + layer + threads, bits + fractions, written_bytes(request)});
+    const double drawn = fill.held + bits +
+                         std::max({parts + least_work + layer + threads, fractions, least_work + layer + fill.filling});
+    return std::max(fill.made, volume + std::max({ring, drawn, written_bytes(request)}));
 }
 
 } // namespace
@@ -220,11 +269,11 @@ double dense_need_beside(const voxelize_request& request, double parts, double f
 double dense_need(const scene& model, const voxelize_request& request) {
     const scene_bytes parts = bytes_of(model, request);
     return dense_need_beside(request, parts.vertices + parts.varyings + parts.triangles + parts.lines,
-                             fraction_bytes(model, request));
+                             fraction_bytes(model, request), fill_bytes_of(model, request));
 }
 
 double dense_need(const voxelize_request& request) {
-    return dense_need_beside(request, 0, fraction_bytes(request, 0, 0));
+    return dense_need_beside(request, 0, fraction_bytes(request, 0, 0), fill_bytes_of(request, 0, 0));
 }
 
 void require_vertices(const scene& model, const voxelize_request& request, double result) {

@@ -292,10 +292,11 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     report.request.write_bytes = [&](double bricks, double voxels, double in_tiles) {
         double bytes = 0;
         for (const std::filesystem::path& output : options.outputs)
-            bytes = std::max(bytes, bytes_to_write(output,
-                                                   {report.request.grid.extent, report.request.targets, storage.sparse,
-                                                    bricks, voxels, in_tiles},
-                                                   options.write));
+            bytes = std::max(
+                bytes, bytes_to_write(output,
+                                      {report.request.grid.extent, report.request.targets, storage.sparse, bricks,
+                                       voxels, in_tiles, report.request.coverage != voxelpipe::coverage::conservative},
+                                      options.write));
         return bytes;
     };
     if (report.request.distance || report.request.remesh) {

@@ -21,6 +21,7 @@ struct expected_result {
     bool is_sparse;
     double bricks, voxels; // occupied ones
     double in_tiles;       // voxels of a solid in tiles, which most writers open
+    bool is_thin = false;  // drawn with a coverage by which voxels meet in edges and corners alone
 };
 
 // Bytes that writing it takes beside the result, about.

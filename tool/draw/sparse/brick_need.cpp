@@ -70,7 +70,7 @@ void surface_layers::add_line(const glm::dvec3& a, const glm::dvec3& b) {
 }
 
 value_sizes value_sizes_of(const voxelize_request& request, double targets) {
-    value_sizes bytes{targets, 0, 0};
+    value_sizes bytes{targets, 0, 0, 0};
     for (const target id : request.targets) {
         const double value = static_cast<double>(size_of(info_of(id).type)) * info_of(id).components;
         bytes.values += value;
@@ -110,6 +110,9 @@ double needed_bytes(const voxelize_request& request, const surface_layers& surfa
         constexpr double half_a_brick = 256;
         written_voxels = half_a_brick * bricks;
         need = std::max(need, threads + held + (listed_brick + held_brick) * bricks + bytes.values * written_voxels);
+        // The bodies are found where the solid lies in the framebuffer and in the result. They may share bricks.
+        const double of_bodies = bytes.bodies * std::max(bricks, surface.voxels() / (brick_side * brick_side));
+        need = std::max(need, held + 2 * held_brick * bricks + of_bodies + bytes.values * written_voxels);
     }
     const double result = held_brick * bricks + bytes.values * written_voxels;
     const double in_tiles = request.solid ? std::max(0.0, std::abs(surface.volume()) - written_voxels) : 0;

@@ -47,6 +47,7 @@ struct brick_counts {
 // Bytes of a voxel in the targets that a slab is drawn into, and of its values in the result.
 struct value_sizes {
     double targets = 0, values = 0, largest = 0; // largest: of one channel
+    double bodies = 0;                           // of a brick of --fill body, where bodies are looked for
 };
 [[nodiscard]] value_sizes value_sizes_of(const voxelize_request& request, double targets);
 

@@ -121,9 +121,10 @@ private:
         const typename base::stage_timer timer{*this, "estimate"};
         const voxelize_request& request = this->request_;
         const surface_layers surface = surface_of(*this->uploaded_);
-        const value_sizes bytes =
+        value_sizes bytes =
             value_sizes_of(request, this->only_bits_ ? (this->counts_fragments() ? 4 : 0.125)
                                                      : static_cast<double>(this->surface_voxel_bytes()));
+        if (this->bodies_ && !this->bodies_->is_everywhere()) bytes.bodies = body_map::brick_bytes;
         if (2 * needed_bytes(request, surface, at_most(surface), bytes) < static_cast<double>(memory::room())) return;
         const int side = counted_side(surface);
         this->backend_.progress = nullptr;

@@ -427,7 +427,7 @@ void describe_output(CLI::App& app, command_line& options, raw_options& raw) {
         ->option_text("N")
         ->group("Files");
     app.add_option("--compression", options.write.compression,
-                   "Level of .npz, .vti, .nrrd, .zarr, .3mf, .schem, .litematic and {z}.png, 0 to 9. Default: 1")
+                   "Level of .npz, .vti, .vtu, .nrrd, .zarr, .3mf, .schem, .litematic and {z}.png, 0 to 9. Default: 1")
         ->check(between(0, 9))
         ->option_text("N")
         ->group("Files");

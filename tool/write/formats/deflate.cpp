@@ -47,6 +47,14 @@ bool repeats(std::span<const std::byte> piece, std::size_t period) {
 
 } // namespace
 
+void whole_compressor::release::operator()(libdeflate_compressor* compressor) const noexcept {
+    libdeflate_free_compressor(compressor);
+}
+
+whole_compressor::whole_compressor(int level) : held_(libdeflate_alloc_compressor(level)) {
+    if (!held_) throw std::bad_alloc{};
+}
+
 compressed_piece piece_compressor::compress_now(std::span<const std::byte> piece) const {
     compressed_piece result;
     result.source_size = piece.size();

@@ -20,7 +20,23 @@
 #include <string>
 #include <vector>
 
+struct libdeflate_compressor;
+
 namespace voxelize {
+
+// A compressor of libdeflate, for what is compressed at once.
+class whole_compressor {
+public:
+    // LEVEL: 0 to 12. Throws std::bad_alloc.
+    explicit whole_compressor(int level);
+    [[nodiscard]] libdeflate_compressor* get() const { return held_.get(); }
+
+private:
+    struct release {
+        void operator()(libdeflate_compressor* compressor) const noexcept;
+    };
+    std::unique_ptr<libdeflate_compressor, release> held_;
+};
 
 // One piece, compressed.
 struct compressed_piece {

@@ -17,6 +17,10 @@ constexpr double inset = 1.0 / 64; // of the way to the mean of the centres of t
 class sheet_insets {
 public:
     explicit sheet_insets(std::span<const voxel_face> faces) {
+        std::size_t count = 0;
+        for (const voxel_face& face : faces)
+            for (std::size_t c = 0; c < 4; ++c) count += face.sheet(c) != 0 ? 1 : 0;
+        entries_.reserve(count);
         for (const voxel_face& face : faces) {
             if (face.sheets == 0) continue;
             const auto corners = corners_of(face);

@@ -3,23 +3,27 @@
 
 #include "png.hpp"
 
+#include "deflate.hpp"
+
 #include <cstdlib>
 #include <exception>
 #include <libdeflate.h>
+#include <new>
 
 // stb_image_write filters and frames; libdeflate compresses, several times as fast as stb's own code.
 namespace {
-unsigned char* compress_png(unsigned char* data, int size, int* packed_size, int) {
+unsigned char* compress_png(unsigned char* data, int size, int* packed_size, int) try {
+    *packed_size = 0;
     constexpr int level = 4;
-    libdeflate_compressor* compressor = libdeflate_alloc_compressor(level);
-    if (compressor == nullptr) return nullptr;
-    const std::size_t bound = libdeflate_zlib_compress_bound(compressor, static_cast<std::size_t>(size));
+    const voxelize::whole_compressor compressor(level);
+    const std::size_t bound = libdeflate_zlib_compress_bound(compressor.get(), static_cast<std::size_t>(size));
     auto* packed = static_cast<unsigned char*>(std::malloc(bound)); // stb frees it
     if (packed != nullptr)
-        *packed_size =
-            static_cast<int>(libdeflate_zlib_compress(compressor, data, static_cast<std::size_t>(size), packed, bound));
-    libdeflate_free_compressor(compressor);
+        *packed_size = static_cast<int>(
+            libdeflate_zlib_compress(compressor.get(), data, static_cast<std::size_t>(size), packed, bound));
     return packed;
+} catch (const std::bad_alloc&) { // stb's way to say so
+    return nullptr;
 }
 } // namespace
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "slices.hpp"
 
+#include "deflate.hpp"
 #include "dense_stream.hpp"
 #include "progress.hpp"
 
@@ -14,15 +15,12 @@
 #include <cstdint>
 #include <cstring>
 #include <libdeflate.h>
-#include <new>
 #include <string_view>
 
 namespace voxelize {
 namespace {
 
 using png_bytes = std::vector<std::byte>;
-
-constexpr std::int64_t widest_picture = 0x7fff'ffff; // of PNG, in pixels
 
 std::filesystem::path slice_path(const std::filesystem::path& path, std::int64_t layer) {
     std::string number = std::to_string(layer);
@@ -100,17 +98,9 @@ png_bytes rows_of(const volume& v, const channel& c, std::int64_t layer, int bit
 }
 
 png_bytes compress_rows(const png_bytes& rows, int level) {
-    libdeflate_compressor* const compressor = libdeflate_alloc_compressor(level);
-    if (compressor == nullptr) throw std::bad_alloc();
-    png_bytes packed;
-    try {
-        packed.resize(libdeflate_zlib_compress_bound(compressor, rows.size()));
-    } catch (...) {
-        libdeflate_free_compressor(compressor);
-        throw;
-    }
-    packed.resize(libdeflate_zlib_compress(compressor, rows.data(), rows.size(), packed.data(), packed.size()));
-    libdeflate_free_compressor(compressor);
+    const whole_compressor compressor(level);
+    png_bytes packed(libdeflate_zlib_compress_bound(compressor.get(), rows.size()));
+    packed.resize(libdeflate_zlib_compress(compressor.get(), rows.data(), rows.size(), packed.data(), packed.size()));
     return packed;
 }
 
@@ -159,8 +149,7 @@ std::vector<std::filesystem::path> write_slices(const volume& v, const std::file
     const channel& c = v.channels.front();
     const int bits = bits_of(c, path, options);
     // Less than what the length of a chunk can say, and a part of what libdeflate takes at once.
-    if (v.extent[0] > widest_picture || v.extent[1] > widest_picture ||
-        (v.extent[0] * bits / 8 + 1) * v.extent[1] > 0x7000'0000)
+    if ((v.extent[0] * bits / 8 + 1) * v.extent[1] > 0x7000'0000)
         throw write_error(path, "a layer has more pixels than a PNG file holds");
     constexpr std::size_t group = 256; // files that are open at once
     std::vector<std::filesystem::path> paths;

@@ -3,13 +3,13 @@
 
 #include "zarr_array.hpp"
 
+#include "deflate.hpp"
 #include "dense_stream.hpp"
 
 #include "model/targets.hpp"
 
 #include <cstring>
 #include <libdeflate.h>
-#include <memory>
 #include <new>
 #include <utility>
 #ifdef VOXELIZE_HAS_ZSTD
@@ -32,9 +32,7 @@ std::uint32_t crc32c(std::span<const std::byte> bytes) {
 }
 
 std::vector<std::byte> gzip(std::span<const std::byte> bytes, int level) {
-    const std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)> compressor(
-        libdeflate_alloc_compressor(level), libdeflate_free_compressor);
-    if (!compressor) throw std::bad_alloc{};
+    const whole_compressor compressor(level);
     std::vector<std::byte> out(libdeflate_gzip_compress_bound(compressor.get(), bytes.size()));
     out.resize(libdeflate_gzip_compress(compressor.get(), bytes.data(), bytes.size(), out.data(), out.size()));
     return out;
