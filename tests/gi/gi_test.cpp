@@ -61,8 +61,8 @@ TEST(Gi, PicturesAreGolden) {
         settings how;
         std::uint64_t digest;
     };
-    const golden pictures[] = {{gi::make_cornell, small(320, 180, 48), 4212674398828701984u},
-                               {gi::make_atrium, small(320, 180, 64), 7712844350141080935u}};
+    const golden pictures[] = {{gi::make_cornell, small(320, 180, 48), 7969733610635623122u},
+                               {gi::make_atrium, small(320, 180, 64), 1104172248962785916u}};
     for (const golden& g : pictures) {
         const std::unique_ptr<gi::renderer> two = gi::make_cpu_renderer(g.make(), g.how);
         settings one_thread = g.how;
@@ -134,7 +134,7 @@ TEST(Gi, AClosedRoomStaysDark) {
         const auto room = gi::make_cpu_renderer(closed_box(voxels * 2 / (46 - 2 * voxels), true), small(48, 48, 48));
         for (const double time : {0.0, 0.3, 0.7}) {
             const pixels seen = room->render(time).pixels;
-            EXPECT_LE(largest_of(seen), 10); // without the roof the mean is more than 75
+            EXPECT_LE(largest_of(seen), 12); // without the roof the mean is more than 75
             std::printf("walls of %.0f voxels: at most %d of 255, mean %.3f\n", voxels, largest_of(seen),
                         mean_of(seen));
         }
