@@ -380,6 +380,8 @@ def sparse(
         >>> inside, _ = vp.sparse(mesh, grid, solid="nonzero")
     """
     check_call("sparse", grid, coverage, threads, status)
+    if solid is not None:
+        check_choice("solid", solid, Fill)
     if values is not None and _is_own(values):
         _check_own(blend, per, fill)
         only = mesh[0] if isinstance(mesh, list) and len(mesh) == 1 else mesh

@@ -20,7 +20,7 @@ from ._axes import as_voxels, dense
 from ._core import Grid
 from ._inputs import refuse_input
 from ._listed import check_shapes, is_list, listed, named, occupied_of
-from ._types import Up, check_choice, check_grid, check_threads
+from ._types import Up, check_choice, check_grid, check_picture, check_threads, whole_number
 from ._view import view
 
 
@@ -94,6 +94,7 @@ def render(
         >>> picture = vp.render(vp.bake("lighthouse.glb", grid), grid, size=(640, 480))
     """
     check_grid(grid, "render")
+    check_picture(size, azimuth, elevation, zoom)
     check_choice("up", up, Up)
     check_threads(threads)
     arrays = named(values)
@@ -315,6 +316,8 @@ def save(
     """
     check_grid(grid, "save")
     check_threads(threads)
+    whole_number("compression", compression, 0, "0 to 9")
+    whole_number("pieces", pieces)
     if up is not None:
         check_choice("up", up, Up)
     target = os.fspath(path)
