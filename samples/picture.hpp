@@ -187,7 +187,7 @@ void write_pixels(const std::string& path, float aspect, const Look& look) {
                 const float right = static_cast<float>(i % side), low = static_cast<float>(i / side);
                 const float px = static_cast<float>(x) + part * (right + 0.5f),
                             py = static_cast<float>(y) + part * (low + 0.5f);
-                // Of another part of the square than the sample's, so that an edge has all parts on both sides.
+                // The noise lies in another part of the square than the sample: an edge has all parts on both sides.
                 const float part_x = static_cast<float>((i / side + x) % side),
                             part_y = static_cast<float>((i % side + y) % side);
                 const glm::vec2 within(part * (part_x + noise()), part * (part_y + noise()));
