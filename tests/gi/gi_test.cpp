@@ -14,6 +14,11 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <unistd.h>
 
 namespace {
 
@@ -100,6 +105,19 @@ TEST(Gi, ClosedPartsAreFound) {
     const std::vector<bool> closed = gi::find_closed(positions, triangles);
     ASSERT_EQ(closed.size(), 47u);
     for (std::size_t i = 0; i < closed.size(); ++i) EXPECT_EQ(closed[i], i < 24) << i;
+}
+
+// The glowing ball goes round a loaded model outside of all its vertices, also of those at the corners of its box.
+TEST(Gi, TheBallStaysOutsideOfAModel) {
+    const std::filesystem::path file =
+        std::filesystem::temp_directory_path() / ("gi_" + std::to_string(::getpid()) + ".obj");
+    std::ofstream(file) << "v 0 0 0\nv 1 0 1\nv 0 0.5 0\nv 1 0.5 1\nf 1 2 3\nf 3 2 4\n"; // a wall along a diagonal
+    const scene s = gi::load_scene(file);
+    std::filesystem::remove(file);
+    for (int i = 0; i < 64; ++i) {
+        const glm::dvec3 ball = s.motion(i / 64.0);
+        EXPECT_GT(std::hypot(ball.x - 0.5, ball.z - 0.5) - 0.04, std::hypot(0.5, 0.5)) << i;
+    }
 }
 
 // A hollow cube in the sun, seen from inside.
