@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// A scan: a turning laser on a tripod hits ground, a house and trees half a million times. Its points become counts and
-// mean colours of voxels, in one pass (scan.ppm).
+// A scan: turning lasers on two tripods and a mast hit ground, a house and trees half a million times, more in a fine
+// picture. The points become counts and mean colours of voxels, in one pass (scan.ppm).
 #include "picture.hpp"
 
 #include <cpu_ref/backend.hpp>
@@ -60,14 +60,15 @@ bool hit(const glm::vec3& from, const glm::vec3& along, glm::vec3& at, glm::vec3
 int main() {
     std::vector<glm::vec3> positions, colors;
     unsigned noise = 1;
-    for (const glm::vec3& tripod : {glm::vec3(62, 14, 96), glm::vec3(52, 12, 40)})
-        for (int row = 0; row < 300; ++row)
-            for (int step = 0; step < 1200; ++step) {
-                const float a = 6.28318531f * static_cast<float>(step) / 1200.0f,
-                            e = -1.2f + 1.9f * static_cast<float>(row) / 300.0f;
+    const int finer = picture::is_fine() ? 3 : 1, rows = 240 * finer, steps = 1000 * finer;
+    for (const glm::vec3& laser : {glm::vec3(62, 14, 96), glm::vec3(52, 12, 40), glm::vec3(112, 60, 84)})
+        for (int row = 0; row < rows; ++row)
+            for (int step = 0; step < steps; ++step) {
+                const float a = 6.28318531f * static_cast<float>(step) / static_cast<float>(steps),
+                            e = -1.2f + 1.9f * static_cast<float>(row) / static_cast<float>(rows);
                 const glm::vec3 along(std::cos(e) * std::cos(a), std::sin(e) + 1e-4f, std::cos(e) * std::sin(a));
                 glm::vec3 at, color;
-                if (!hit(tripod, along, at, color)) continue;
+                if (!hit(laser, along, at, color)) continue;
                 glm::vec3 error;
                 for (int k = 0; k < 3; ++k)
                     error[k] = static_cast<float>((noise = noise * 1664525u + 1013904223u) >> 8) * 0x1p-24f - 0.5f;
@@ -92,7 +93,7 @@ int main() {
                        const std::uint32_t n = counts(x, y, z);
                        return n == 0 ? glm::vec3(-1.0f) : sums(x, y, z) / static_cast<float>(n);
                    },
-                   {.zoom = 1.35f});
+                   {.along = {-0.55f, -0.62f, -1.0f}, .zoom = 1.55f});
     std::printf("%zu points, %llu of them in %llu voxels\n", positions.size(),
                 static_cast<unsigned long long>(s.counts.fragments), static_cast<unsigned long long>(s.counts.voxels));
     return s.counts.triangles_in == positions.size() && s.counts.voxels > 10000 ? 0 : 1;

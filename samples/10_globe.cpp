@@ -23,7 +23,7 @@ struct lift {
     vp::field2d<float> height;
     VOXELPIPE_HD auto operator()(const vp::vertex<>& v) const {
         const float land = glm::max(0.0f, height(map_of(v.position)) - 0.5f);
-        return vp::vertex_output{(70.0f + 34.0f * land) * v.position + 96.0f, on_map{v.position}};
+        return vp::vertex_output{(76.0f + 34.0f * land) * v.position + 96.0f, on_map{v.position}};
     }
 };
 struct paint {
@@ -52,15 +52,15 @@ float noise(glm::vec3 p) {
 }
 
 int main() {
-    constexpr int width = 512, height = 256;
+    const int finer = picture::is_fine() ? 2 : 1, width = 1024 * finer - 512, height = width / 2;
     std::vector<float> heights;
     std::vector<glm::vec3> colors;
     for (int i = 0; i < width * height; ++i) {
         const int column = i % width, row = i / width;
-        const float a = 6.2831853f * ((static_cast<float>(column) + 0.5f) / width - 0.5f),
-                    e = 3.1415927f * ((static_cast<float>(row) + 0.5f) / height - 0.5f);
+        const float a = 6.2831853f * ((static_cast<float>(column) + 0.5f) / static_cast<float>(width) - 0.5f),
+                    e = 3.1415927f * ((static_cast<float>(row) + 0.5f) / static_cast<float>(height) - 0.5f);
         const glm::vec3 d(std::cos(e) * std::cos(a), std::sin(e), std::cos(e) * std::sin(a));
-        const float h = noise(2.1f * d + 3.0f), ice = glm::smoothstep(0.82f, 0.9f, std::abs(d.y) + 0.3f * (h - 0.5f)),
+        const float h = noise(2.9f * d + 3.0f), ice = glm::smoothstep(0.82f, 0.9f, std::abs(d.y) + 0.3f * (h - 0.5f)),
                     dry = glm::smoothstep(0.35f, 0.6f, noise(3.0f * d + 40.0f) - 0.25f * std::abs(d.y));
         const glm::vec3 sea =
             glm::mix(glm::vec3(0.08f, 0.22f, 0.42f), glm::vec3(0.20f, 0.52f, 0.62f), glm::smoothstep(0.38f, 0.5f, h));
@@ -87,12 +87,13 @@ int main() {
     vp::cpu_backend backend;
     const vp::mesh mesh{backend, positions, triangles};
     vp::grid grid;
-    grid.extent = glm::ivec3(192);
+    grid.extent = glm::ivec3(192 * finer);
+    grid.voxel_size = glm::dvec3(1.0 / finer);
     vp::framebuffer<vp::cpu_backend, vp::target<glm::vec3, vp::blend::add>, vp::target<std::uint32_t, vp::blend::count>>
         fb{backend, grid.extent};
     const auto nearest = vp::filter_mode::nearest;
     const vp::status s = vp::voxelize(backend, mesh, grid, lift{{heights.data(), width, height}},
-                                      paint{{colors.data(), width, height, 1, nearest}}, fb, vp::coverage::thin)
+                                      paint{{colors.data(), width, height, 1, nearest}}, fb)
                              .or_throw();
     const auto sums = vp::get<0>(fb).to_host_target(backend);
     const auto counts = vp::get<1>(fb).to_host_target(backend);
@@ -100,7 +101,9 @@ int main() {
         const std::uint32_t n = counts(x, y, z);
         return n == 0 ? glm::vec3(-1.0f) : sums(x, y, z) / static_cast<float>(n);
     };
-    picture::write("globe.ppm", grid.extent, mean, {.along = {-0.5f, -0.35f, -1.0f}, .zoom = 1.3f, .has_floor = false});
+    picture::write("globe.ppm", grid.extent, mean, {.along = {-0.5f, -0.35f, -1.0f}, .zoom = 1.45f});
     std::printf("%zu triangles, %llu voxels\n", triangles.size(), static_cast<unsigned long long>(s.counts.voxels));
-    return s.counts.voxels > 60000 && counts(96, 96, 96) == 0 && mean(96, 96, 96).x < 0.0f ? 0 : 1;
+    const int middle = 96 * finer;
+    return s.counts.voxels > 60000 && counts(middle, middle, middle) == 0 && mean(middle, middle, middle).x < 0.0f ? 0
+                                                                                                                   : 1;
 }

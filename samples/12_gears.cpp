@@ -14,7 +14,7 @@ namespace vp = voxelpipe;
 
 constexpr float full_turn = 6.2831853f;
 
-// A ring with teeth, closed: rows of four vertices, outside and bore, below and above.
+// A wheel with teeth, closed: rows of eight vertices around its profile, a rim and a hub with a thinner disc between.
 struct gear {
     std::vector<glm::vec3> positions;
     std::vector<glm::uvec3> triangles;
@@ -27,10 +27,18 @@ struct gear {
                         a = full_turn * static_cast<float>(i) / static_cast<float>(n);
             const float tooth = glm::clamp(3.2f * std::cos(full_turn * phase), -1.0f, 1.0f); // flat tips and roots
             const float r = radius + 4.0f * tooth;
-            for (const auto& [at, y] : {std::pair{r, 0.0f}, {r, thickness}, {bore, thickness}, {bore, 0.0f}})
+            const float rim = radius - 9.0f, hub = bore + 5.0f, disc = 0.65f * thickness;
+            for (const auto& [at, y] : {std::pair{r, 0.0f},
+                                        {r, thickness},
+                                        {rim, thickness},
+                                        {rim, disc},
+                                        {hub, disc},
+                                        {hub, thickness},
+                                        {bore, thickness},
+                                        {bore, 0.0f}})
                 positions.emplace_back(at * std::cos(a), y, at * std::sin(a));
-            for (unsigned k = 0; k < 4; ++k) {
-                const auto p = [&](unsigned j, unsigned m) { return j % n * 4 + m % 4; };
+            for (unsigned k = 0; k < 8; ++k) {
+                const auto p = [&](unsigned j, unsigned m) { return j % n * 8 + m % 8; };
                 triangles.emplace_back(p(i, k), p(i, k + 1), p(i + 1, k));
                 triangles.emplace_back(p(i, k + 1), p(i + 1, k + 1), p(i + 1, k));
             }
@@ -82,10 +90,16 @@ int main() {
     }
     const std::uint64_t at_free = collide(free, 0.0f), closer = collide(free - 3.0f, 0.12f);
 
+    if (picture::is_fine()) { // voxels of a quarter, and teeth far enough into each other to be seen
+        grid.extent *= 4;
+        grid.voxel_size = grid.voxel_size / 4.0;
+        fb = vp::framebuffer<vp::cpu_backend, bodies>{backend, grid.extent};
+        collide(free - 4.0f, 0.12f);
+    }
     const auto host = vp::get<0>(fb).to_host_target(backend);
     const glm::vec3 colors[] = {glm::vec3(-1.0f), {0.86f, 0.64f, 0.26f}, {0.52f, 0.60f, 0.68f}, {0.92f, 0.13f, 0.10f}};
     picture::write("gears.ppm", grid.extent, [&](int x, int y, int z) { return colors[host(x, y, z)]; },
-                   {.along = {-0.25f, -1.0f, -0.75f}, .zoom = 1.12f, .aspect = 1.6f});
+                   {.along = {-0.2f, -1.0f, -0.62f}, .zoom = 1.38f, .aspect = 1.6f});
     std::printf("free from %.2f voxels between the axes; 3 closer, %llu voxels collide; %llu open rows\n",
                 static_cast<double>(free), static_cast<unsigned long long>(closer),
                 static_cast<unsigned long long>(open_rows));

@@ -162,27 +162,39 @@ inline glm::vec3 tiles(const glm::vec3& at, float size) {
     return is_dark ? glm::vec3(0.10f, 0.12f, 0.15f) : glm::vec3(0.62f, 0.60f, 0.56f);
 }
 
-// A file of the colours that look(x, y) gives, x and y from 0 to 1 from the upper left; four of them make a pixel.
+// Pixels of a picture from side to side.
+inline int width() {
+    const char* asked = std::getenv("PICTURE_WIDTH"); // NOLINT(concurrency-mt-unsafe): nobody sets it meanwhile
+    return asked != nullptr ? std::clamp(std::atoi(asked), 16, 4096) : 800;
+}
+// True for pictures that people look at; those of tests are smaller, and take few voxels and samples.
+inline bool is_fine() { return width() >= 400; }
+
+// A file of the colours that look(x, y, noise) gives, x and y from 0 to 1 from the upper left; 4 of them make a pixel,
+// 16 in a fine picture, whose noise covers the square evenly.
 template <class Look>
 void write_pixels(const std::string& path, float aspect, const Look& look) {
-    const char* asked = std::getenv("PICTURE_WIDTH"); // NOLINT(concurrency-mt-unsafe): nobody sets it meanwhile
-    const int width = asked != nullptr ? std::clamp(std::atoi(asked), 16, 4096) : 800;
-    const int height = static_cast<int>(static_cast<float>(width) / aspect);
+    const int width = picture::width(), height = static_cast<int>(static_cast<float>(width) / aspect);
+    const int side = is_fine() ? 4 : 2, samples = side * side;
+    const float part = 1.0f / static_cast<float>(side);
     std::vector<char> pixels;
     std::uint32_t random = 1;
     const auto noise = [&] { return static_cast<float>((random = random * 1664525u + 1013904223u) >> 8) * 0x1p-24f; };
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x) {
             glm::vec3 sum(0.0f);
-            for (int i = 0; i < 4; ++i) {
-                const int right = i % 2, low = i / 2;
-                const float px = static_cast<float>(x) + 0.25f + 0.5f * static_cast<float>(right),
-                            py = static_cast<float>(y) + 0.25f + 0.5f * static_cast<float>(low);
-                const glm::vec3 c =
-                    look(px / static_cast<float>(width), py / static_cast<float>(height), glm::vec2(noise(), noise()));
+            for (int i = 0; i < samples; ++i) {
+                const float right = static_cast<float>(i % side), low = static_cast<float>(i / side);
+                const float px = static_cast<float>(x) + part * (right + 0.5f),
+                            py = static_cast<float>(y) + part * (low + 0.5f);
+                // The noise lies in another part of the square than the sample: an edge has all parts on both sides.
+                const float part_x = static_cast<float>((i / side + x) % side),
+                            part_y = static_cast<float>((i % side + y) % side);
+                const glm::vec2 within(part * (part_x + noise()), part * (part_y + noise()));
+                const glm::vec3 c = look(px / static_cast<float>(width), py / static_cast<float>(height), within);
                 sum += glm::pow(glm::clamp(c, 0.0f, 1.0f), glm::vec3(1.0f / 2.2f));
             }
-            for (int c = 0; c < 3; ++c) pixels.push_back(static_cast<char>(std::lround(255.0f * 0.25f * sum[c])));
+            for (int c = 0; c < 3; ++c) pixels.push_back(static_cast<char>(std::lround(255.0f * part * part * sum[c])));
         }
     std::ofstream out(path, std::ios::binary);
     out << "P6\n" << width << ' ' << height << "\n255\n";

@@ -66,6 +66,8 @@ TASKS = [
     ("A mesh with holes", "samples/guide/solids.cpp", "holes", "solids"),
     ("Distances from a mesh", "samples/17_clearance.cpp", "fields", "distances"),
     ("A closed mesh of any triangles", "samples/19_remesh.cpp", "remesh", "surfaces"),
+    ("How much of a voxel is inside", "samples/guide/solids.cpp", "fractions", "cells"),
+    ("Connected components", "samples/guide/solids.cpp", "labels", "label"),
     ("Instances", "samples/09_forest.cpp", "instances", "meshes"),
     ("Points", "samples/08_points.cpp", "points", "meshes"),
     ("Tessellation", "samples/05_displaced.cpp", "tessellation", "programs"),
@@ -84,6 +86,15 @@ HIDDEN = ["sparse/io/nanovdb_nodes.hpp"]
 PYTHON = ["Grid", "fit", "load_model", "Model", "Material", "Texture", "Part", "voxelize", "solid", "tiles", "distance", "distance_at", "fractions", "label", "remesh", "extract",
           "bake", "sparse", "dense", "VoxelList", "lines", "points", "instances", "Octree", "Hits", "fragments", "Fragments", "save", "formats", "render", "view", "View",
           "DroppedTrianglesWarning", "OpenMeshWarning", "ModelWarning", "WriteError"]
+# Pictures of functions that docs/site/python_pictures.py makes none of.
+PYTHON_PICTURES = {"load_model": "docs/lighthouse.png", "render": "docs/torus.png", "view": "docs/gallery/page.png",
+                   "distance_at": "docs/python/distance.png"}
+
+
+def picture_of(name):
+    """The file of a function's picture, in the repository; empty where it has none."""
+    file = PYTHON_PICTURES.get(name, f"docs/python/{name}.png")
+    return file if (pathlib.Path(__file__).resolve().parents[2] / file).exists() else ""
 
 
 def heading(text, line="="):
@@ -160,4 +171,8 @@ def write_api(out, xml, python_source):
             text += f".. autoclass:: {name}\n   :members:\n\n"
         else:
             text += f".. autofunction:: {name}\n\n"
+        if picture_of(name):
+            text += f".. image:: ../_static/{picture_of(name)}\n   :width: 360px\n   :alt: What {name} makes\n\n"
+        elif name[0].islower() and name != "formats":
+            sys.exit(f"{name} has no picture: docs/site/python_pictures.py")
     (folder / "python.rst").write_text(text, encoding="utf-8")

@@ -14,7 +14,7 @@ import re
 import shutil
 
 import history
-from api_pages import write_api
+from api_pages import PYTHON, picture_of, write_api
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SITE = ROOT / "docs" / "site"
@@ -89,6 +89,8 @@ def main():
         shutil.copy(SITE / name, args.out / "_static" / name)
     converter.picture("docs/lighthouse.png")
     converter.picture("docs/lighthouse_cut.png")
+    for file in {picture_of(name) for name in PYTHON} - {""}:
+        converter.picture(file)
     write_api(args.out, args.xml, (ROOT / "python" / "src" / "grid.cpp").read_text(encoding="utf-8"))
 
 

@@ -56,6 +56,19 @@ CASES = [
     (ValueError, "up is one of 'y', 'z', not 'x'", lambda: vp.save("a.html", np.zeros(GRID.shape, bool), GRID, up="x")),
     (TypeError, "zoom: for .png only", lambda: vp.save("a.npy", np.zeros(GRID.shape), GRID, zoom=2)),
     (ValueError, "background is 'sky'.*not 'pink'", lambda: vp.render(np.ones(GRID.shape, bool), GRID, background="pink")),
+    (TypeError, "size is a width and a height.*not 64", lambda: vp.render(np.ones(GRID.shape, bool), GRID, size=64)),
+    (ValueError, "a side of size is 1 or more, not 0", lambda: vp.render(np.ones(GRID.shape, bool), GRID, size=(0, 9))),
+    (TypeError, "zoom is a number, not str", lambda: vp.render(np.ones(GRID.shape, bool), GRID, zoom="near")),
+    (TypeError, "compression is a whole number, not str",
+     lambda: vp.save("a.vti", np.ones(GRID.shape, bool), GRID, compression="high")),
+    (ValueError, "pieces is 0 or more, not -1", lambda: vp.save("a.pvti", np.ones(GRID.shape, bool), GRID, pieces=-1)),
+    (TypeError, "level is a number, not str", lambda: vp.remesh(MESH, GRID, level="x")),
+    (ValueError, "level is a finite number, not nan", lambda: vp.remesh(MESH, GRID, level=float("nan"))),
+    (ValueError, "min_component is a number of vertices", lambda: vp.remesh(MESH, GRID, min_component=-1)),
+    (ValueError, r"positions are an array \(n, 3\), not \(4, 2\)", lambda: vp.points(np.zeros((4, 2)))),
+    (ValueError, r"positions are an array \(n, 3\), not \(\)", lambda: vp.points(5)),
+    (ValueError, "solid is one of 'nonzero'.*not 'yes'", lambda: vp.sparse(MESH, GRID, solid="yes")),
+    (ValueError, r"voxels: an array \(n, 3\)", lambda: vp.Octree(np.zeros((2, 2), int), GRID)),
 ]  # fmt: skip
 
 

@@ -99,3 +99,17 @@ def test_values_without_colours():
         vp.bake((v, f), grid, "normal", blend="max")
     with pytest.raises(TypeError, match="values is a mapping"):
         vp.bake((v, f), grid, 5)
+
+
+def test_a_solid_with_its_colours_reads_a_file_once(tmp_path, monkeypatch):
+    v, f = sphere(levels=2)
+    path = ply(tmp_path / "a.ply", v, f, np.full((len(v), 3), 200, np.uint8), "vertex")
+    grid = vp.fit(path, 16)
+    loaded = vp.load_model(path)
+    expected = vp.sparse(loaded, grid, "color", solid="nonzero")
+    read = []
+    monkeypatch.setattr("voxelpipe._model.note_model", lambda file, named: read.append(file))
+    for model in (path, [path]):
+        voxels, rows = vp.sparse(model, grid, "color", solid="nonzero")
+        assert np.array_equal(voxels, expected[0]) and np.array_equal(rows["color"], expected[1]["color"])
+    assert read == [str(path)] * 2

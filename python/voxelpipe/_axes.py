@@ -82,7 +82,7 @@ def as_voxels(ijk: Any, what: str = "ijk") -> np.ndarray:
     """Voxels as a plain array (n, 3) int32, C order. Raises ValueError."""
     a = np.asarray(to_numpy(ijk, what))
     if a.ndim != 2 or a.shape[1] != 3:
-        raise ValueError(f"{what} are voxels (n, 3) with columns x, y, z, not an array {a.shape}")
+        raise ValueError(f"{what}: an array (n, 3) with the columns x, y, z of voxels, not {a.shape}")
     if a.dtype.kind not in "iu":
         raise ValueError(f"{what} are whole numbers, not {a.dtype}; to_ijk() gives the voxels of positions")
     if a.dtype != np.int32:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import Any, Mapping, Sequence, overload
 
@@ -16,6 +17,7 @@ from ._axes import VoxelList, scattered
 from ._core import Grid
 from ._device import DeviceMesh
 from ._mesh import Mesh, ModelMesh, as_mesh
+from ._model import Model, read_scene
 from ._solid import solid_voxels
 from ._surface import listed_for, take_counts
 from ._types import (
@@ -378,8 +380,13 @@ def sparse(
         >>> inside, _ = vp.sparse(mesh, grid, solid="nonzero")
     """
     check_call("sparse", grid, coverage, threads, status)
+    if solid is not None:
+        check_choice("solid", solid, Fill)
     if values is not None and _is_own(values):
         _check_own(blend, per, fill)
+        only = mesh[0] if isinstance(mesh, list) and len(mesh) == 1 else mesh
+        if solid is not None and isinstance(only, (str, os.PathLike)):  # its colours and its solid by one reading
+            mesh = Model(os.fspath(only), read_scene(os.fspath(only), False, 2))
         listed, own, counts = _own(mesh, grid, values, coverage, threads)  # type: ignore[arg-type]
         to_caller = _to_caller(mesh)
         rows = {n: a for n, (a, _) in own.items()}

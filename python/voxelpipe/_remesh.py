@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -11,14 +10,12 @@ from . import _core
 from ._core import Grid
 from ._distance import _host_mesh, _warn_of_holes
 from ._surface import take_counts
-from ._types import Bodies, Border, Fill, MeshLike, Place, Repair, check_call, check_choice
+from ._types import Bodies, Border, Fill, MeshLike, Place, Repair, check_call, check_choice, real_number, whole_number
 
 
 def _check_numbers(level: float, min_component: int) -> None:
-    if not math.isfinite(level):
-        raise ValueError(f"level is a finite number, not {level!r}")
-    if min_component < 0:
-        raise ValueError(f"min_component is a number of vertices, 0 or more, not {min_component!r}")
+    real_number("level", level)
+    whole_number("min_component", min_component, 0, "a number of vertices, 0 or more")
 
 
 def _faces_for(to_caller: Any, faces: np.ndarray) -> Any:

@@ -20,7 +20,7 @@ from ._axes import as_voxels, dense
 from ._core import Grid
 from ._inputs import refuse_input
 from ._listed import check_shapes, is_list, listed, named, occupied_of
-from ._types import Up, check_choice, check_grid, check_threads
+from ._types import Up, check_choice, check_grid, check_picture, check_threads, whole_number
 from ._view import view
 
 
@@ -94,6 +94,7 @@ def render(
         >>> picture = vp.render(vp.bake("lighthouse.glb", grid), grid, size=(640, 480))
     """
     check_grid(grid, "render")
+    check_picture(size, azimuth, elevation, zoom)
     check_choice("up", up, Up)
     check_threads(threads)
     arrays = named(values)
@@ -279,9 +280,9 @@ def save(
     names), or that holds one of the values (numpy.memmap), is not replaced: ValueError.
 
     "FOLDER/{z}.png": a grey picture of each layer, 0000.png and so on, y upwards: of bools 0 and 255, of floats from 0 to 1 in
-    16 bits, uint8 and uint16 as they are. .npy: one array, as it is. .npz: the arrays by name, with origin and voxel_size. .nvdb (NanoVDB): the occupied voxels
-    with their values, a grid for each name. .png: a picture, see render(). .html: a page, see view(). .vti, .pvti, .nrrd and
-    .zarr: all arrays. .vox, .schem, .litematic, .binvox, .glb, .obj, .ply, .stl, .3mf, .xyz: the occupied voxels, with the
+    16 bits, uint8 and uint16 as they are. .npy: one array, as it is. .npz: the arrays by name, with origin and voxel_size.
+    .nvdb (NanoVDB): the occupied voxels with their values, a grid for each name. .png: a picture, see render(). .html: a page,
+    see view(). .vti, .pvti, .nrrd and .zarr: all arrays. .vox, .schem, .litematic, .binvox, .glb, .obj, .ply, .stl, .3mf, .xyz: the occupied voxels, with the
     first array of colours where the format has any. .vtu, .inp, .msh: a hexahedron for each occupied voxel, with all arrays
     (.vtu) or with sets by the numbers of the array "material"; occupied=fractions >= 0.5 makes them of fractions.
 
@@ -315,6 +316,8 @@ def save(
     """
     check_grid(grid, "save")
     check_threads(threads)
+    whole_number("compression", compression, 0, "0 to 9")
+    whole_number("pieces", pieces)
     if up is not None:
         check_choice("up", up, Up)
     target = os.fspath(path)

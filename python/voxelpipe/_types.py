@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 import os
 from typing import Any, List, Literal, Mapping, Protocol, Sequence, Tuple, Union, get_args
@@ -133,6 +134,29 @@ def whole_number(what: str, value: Any, least: int = 0, expected: str = "") -> i
     if n < least:
         raise ValueError(f"{what} is {expected or f'{least} or more'}, not {n}")
     return n
+
+
+def real_number(what: str, value: Any) -> float:
+    """Raises TypeError for what is no number, ValueError for one that is not finite."""
+    try:
+        x = float(value) if not isinstance(value, (str, bytes)) else None
+    except (TypeError, ValueError):
+        x = None
+    if x is None:
+        raise TypeError(f"{what} is a number, not {type(value).__name__}")
+    if not math.isfinite(x):
+        raise ValueError(f"{what} is a finite number, not {x!r}")
+    return x
+
+
+def check_picture(size: Any, azimuth: Any, elevation: Any, zoom: Any) -> None:
+    """The arguments of pictures. Raises TypeError or ValueError that names the argument."""
+    if isinstance(size, (str, bytes)) or not hasattr(size, "__len__") or len(size) != 2:
+        raise TypeError(f"size is a width and a height in pixels, such as (640, 480), not {size!r}")
+    for side in size:
+        whole_number("a side of size", side, 1)
+    for what, value in (("azimuth", azimuth), ("elevation", elevation), ("zoom", zoom)):
+        real_number(what, value)
 
 
 def check_threads(threads: Any) -> int:

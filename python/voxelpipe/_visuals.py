@@ -288,7 +288,10 @@ def points(positions: Any, colors: Any = None) -> Model:
         >>> cloud = vp.points(xyz, rgb)
         >>> voxels, rows = vp.sparse(cloud, vp.fit(cloud, voxel_size=0.05), "color")
     """
-    n = np.arange(len(positions))
+    shape = np.shape(to_numpy(positions, "positions"))
+    if len(shape) != 2 or shape[1] != 3:
+        raise ValueError(f"positions are an array (n, 3), not {shape}")
+    n = np.arange(shape[0])
     return Model("points", lines(positions, np.stack([n, n], axis=1), colors)._scene)
 
 

@@ -194,10 +194,10 @@ scene make_atrium() {
     b.add(make_ball(0.24, 16), {.color = glm::vec3(0.0f), .emission = {34.0f, 17.0f, 5.0f}}, part_kind::moving);
 
     scene s = b.finish();
-    set_sun(s, {0.3f, 1.15f, 0.5f}, 0.008f, {38.0f, 31.0f, 21.0f});
-    s.sky_above = {0.42f, 0.80f, 1.65f};
-    s.sky_level = {0.95f, 1.15f, 1.4f};
-    s.exposure = 0.52f;
+    set_sun(s, {0.3f, 1.15f, 0.5f}, 0.008f, {30.0f, 25.0f, 17.5f});
+    s.sky_above = {0.72f, 1.30f, 2.45f};
+    s.sky_level = {2.20f, 2.50f, 2.85f};
+    s.exposure = 0.90f;
     s.wall = 1.25 * wall; // what passes through the outer walls is not seen here
     s.motion = [](double t) {
         const double a = 2 * pi * t + 3.7;

@@ -56,12 +56,19 @@ scene load_scene(const std::filesystem::path& file) {
         }
     const glm::dvec3 size = high - low, centre = 0.5 * (low + high);
     const double across = std::max(size.x, size.z), round = std::max({size.x, size.y, size.z});
+    double widest = 0; // distance of a vertex from the vertical line through the middle
+    for (const glm::uvec3& t : loaded.triangles)
+        for (int c = 0; c < 3; ++c) {
+            const glm::vec3& p = loaded.positions[t[c]];
+            widest =
+                std::max(widest, std::hypot(static_cast<double>(p.x) - centre.x, static_cast<double>(p.z) - centre.z));
+        }
     if (!(round > 0) || !std::isfinite(round)) throw voxelize::model_error("the model has no extent");
 
     // The stage first: closed parts, of a size that suits the model; then the model's triangles behind them.
     scene_builder b;
     mesh ground;
-    const double reach = 0.5 * across + 0.35 * round;
+    const double reach = std::max(0.5 * across, widest) + 0.35 * round;
     ground.add_lathe(std::vector<demo_model::vec2>{{0, -0.08}, {1, -0.08}, {1, 0}, {0, 0}}, 64);
     const auto scaled = [](mesh m, double by, const glm::dvec3& to) {
         for (auto& p : m.positions)
@@ -113,10 +120,11 @@ scene load_scene(const std::filesystem::path& file) {
     s.high = {centre.x + reach, high.y + above, centre.z + reach};
     set_sun(s, {0.55f, 1.0f, 0.65f}, 0.03f, {5.6f, 5.1f, 4.4f});
     s.sky_above = {0.55f, 0.75f, 1.1f};
-    s.sky_level = {0.85f, 0.85f, 0.85f};
+    s.sky_level = {0.80f, 0.92f, 1.10f};
     s.exposure = 0.85f;
     s.motion = [=](double t) {
-        const double a = 2 * std::numbers::pi * t + 0.7, r = 0.5 * across + 0.16 * round;
+        // The ball stays outside of the model: its radius is 0.04 of the model's size.
+        const double a = 2 * std::numbers::pi * t + 1.5, r = widest + 0.1 * round;
         return glm::dvec3(centre.x + r * std::sin(a), low.y + (0.3 + 0.2 * std::sin(2 * a)) * size.y + 0.05 * round,
                           centre.z + r * std::cos(a));
     };

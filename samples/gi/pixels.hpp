@@ -158,8 +158,9 @@ struct receive_light {
         if (!order.place(i, true, at)) return;
         const std::size_t ray = order.index(at);
         if (data.near[ray].facing == 0) return;
+        // From 1.5 voxels on: finer samples show the steps of the voxels of walls that stand aslant as stripes.
         const cone_light around = gather(mips, world, cones, eye_rays::phase(at.x, at.y), data.near[ray].position,
-                                         data.seen[ray].normal, 1.0f);
+                                         data.seen[ray].normal, 1.5f);
         data.received[ray].diffuse = wants_occlusion ? glm::vec3(around.occlusion) : around.light;
     }
 };
@@ -209,13 +210,13 @@ struct draw_pixels {
         const glm::vec3 color = sum * (1.0f / static_cast<float>(samples * samples));
         out[i] = voxelize::encode(*world.tables, glm::vec4(color, 1.0f));
     }
-    // Radiance to the range of a screen: white from 5 on, with some contrast.
+    // Radiance to the range of a screen: white from 5 on, with a little contrast.
     [[nodiscard]] VOXELPIPE_HD static glm::vec3 tone(const glm::vec3& c) {
         glm::vec3 r;
         for (int k = 0; k < 3; ++k) {
             const float x = c[k] < 5.0f ? c[k] : 5.0f;
             const float y = x * (1.0f + x * 0.04f) / (1.0f + x);
-            r[k] = 0.6f * y + 0.4f * (y * y * (3.0f - 2.0f * y));
+            r[k] = 0.9f * y + 0.1f * (y * y * (3.0f - 2.0f * y));
         }
         return r;
     }
@@ -305,8 +306,13 @@ struct draw_level {
         vp::walk_cells(vp::mip_extent(mips.extent, level), rays.eye * scale, direction, 1e6f,
                        [&](const vp::walked_cell<float>& at) {
                            const int towards = 2 * at.axis + (at.from_above ? 1 : 0);
-                           const glm::vec4 v = p.mips.fetch(p.level, towards, at.cell);
+                           glm::vec4 v = p.mips.fetch(p.level, towards, at.cell);
                            if (!(v.w > 0.06f)) return false;
+                           // A voxel that is lit on other sides alone shows one of those: black would look like a hole.
+                           for (int side = 0; side < 6 && v.x + v.y + v.z == 0.0f; ++side) {
+                               const glm::vec4 other = p.mips.fetch(p.level, side, at.cell);
+                               if (other.w > 0.06f) v = other;
+                           }
                            found = glm::vec3(v) / v.w;
                            return true;
                        });

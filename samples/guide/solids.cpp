@@ -65,6 +65,31 @@ int main() {
     good = good && closed.counts.voxels == std::uint64_t{4} * 4 * 12 && closed.solid.holes == 1 &&
            closed.solid.open_rows == 0;
 
+    {
+        // snippet: labels
+        vp::framebuffer<vp::cpu_backend, vp::target<std::int32_t, vp::blend::replace>> labels{backend, grid.extent};
+        vp::cpu_backend::buffer<vp::voxel_component> components{backend, 0};
+        const vp::status s =
+            vp::label(backend, vp::get<0>(inside).view(), vp::get<0>(labels).view(), components, {.connectivity = 26});
+        s.or_throw();
+        for (const vp::voxel_component& c : components.to_host(backend))
+            std::printf("%lld: %llu voxels\n", static_cast<long long>(c.name),
+                        static_cast<unsigned long long>(c.voxels));
+        // end snippet
+        good = good && s.label.components == 1 && components.to_host(backend)[0].voxels == closed.counts.voxels;
+    }
+    {
+        const vp::mesh_view<> mesh{post.positions, post.triangles};
+        // snippet: fractions
+        using field = vp::framebuffer<vp::cpu_backend, vp::target<float, vp::blend::replace>>;
+        field fractions{backend, grid.extent};
+        const vp::status s = vp::voxelize_cells(backend, mesh, grid, vp::passthrough{}, vp::fraction{}, fractions);
+        s.or_throw();
+        const double volume_in_voxels = s.cells.volume();
+        // end snippet
+        good = good && volume_in_voxels == 4.0 * 4 * 12;
+    }
+
     // snippet: stream
     namespace slabs = vp::slabs;
     using bits = vp::sparse_framebuffer<vp::cpu_backend, vp::target<vp::bit, vp::blend::bit_or>>;

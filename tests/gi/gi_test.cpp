@@ -14,6 +14,11 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <unistd.h>
 
 namespace {
 
@@ -61,8 +66,8 @@ TEST(Gi, PicturesAreGolden) {
         settings how;
         std::uint64_t digest;
     };
-    const golden pictures[] = {{gi::make_cornell, small(320, 180, 48), 4212674398828701984u},
-                               {gi::make_atrium, small(320, 180, 64), 7712844350141080935u}};
+    const golden pictures[] = {{gi::make_cornell, small(320, 180, 48), 7969733610635623122u},
+                               {gi::make_atrium, small(320, 180, 64), 1104172248962785916u}};
     for (const golden& g : pictures) {
         const std::unique_ptr<gi::renderer> two = gi::make_cpu_renderer(g.make(), g.how);
         settings one_thread = g.how;
@@ -102,6 +107,19 @@ TEST(Gi, ClosedPartsAreFound) {
     for (std::size_t i = 0; i < closed.size(); ++i) EXPECT_EQ(closed[i], i < 24) << i;
 }
 
+// The glowing ball goes round a loaded model outside of all its vertices, also of those at the corners of its box.
+TEST(Gi, TheBallStaysOutsideOfAModel) {
+    const std::filesystem::path file =
+        std::filesystem::temp_directory_path() / ("gi_" + std::to_string(::getpid()) + ".obj");
+    std::ofstream(file) << "v 0 0 0\nv 1 0 1\nv 0 0.5 0\nv 1 0.5 1\nf 1 2 3\nf 3 2 4\n"; // a wall along a diagonal
+    const scene s = gi::load_scene(file);
+    std::filesystem::remove(file);
+    for (int i = 0; i < 64; ++i) {
+        const glm::dvec3 ball = s.motion(i / 64.0);
+        EXPECT_GT(std::hypot(ball.x - 0.5, ball.z - 0.5) - 0.04, std::hypot(0.5, 0.5)) << i;
+    }
+}
+
 // A hollow cube in the sun, seen from inside.
 scene closed_box(double thickness, bool roof) {
     gi::scene_builder b;
@@ -134,7 +152,7 @@ TEST(Gi, AClosedRoomStaysDark) {
         const auto room = gi::make_cpu_renderer(closed_box(voxels * 2 / (46 - 2 * voxels), true), small(48, 48, 48));
         for (const double time : {0.0, 0.3, 0.7}) {
             const pixels seen = room->render(time).pixels;
-            EXPECT_LE(largest_of(seen), 10); // without the roof the mean is more than 75
+            EXPECT_LE(largest_of(seen), 12); // without the roof the mean is more than 75
             std::printf("walls of %.0f voxels: at most %d of 255, mean %.3f\n", voxels, largest_of(seen),
                         mean_of(seen));
         }
