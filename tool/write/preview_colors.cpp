@@ -135,7 +135,8 @@ voxel_colors::voxel_colors(const channel* shown, const volume* dense) : shown_(s
 void voxel_colors::find_range(const volume* dense) {
     value_sample sample;
     if (dense == nullptr) {
-        const std::size_t each = size_of(shown_->type) * static_cast<std::size_t>(shown_->components);
+        const std::size_t each = // not 0, of which the analyzer cannot know
+            std::max<std::size_t>(size_of(shown_->type) * static_cast<std::size_t>(shown_->components), 1);
         const auto count = static_cast<std::int64_t>(shown_->data.size() / each);
         for (std::int64_t n = 0; n < count; ++n) sample.add(value_of(*shown_, n, 0));
     } else {
