@@ -184,13 +184,13 @@ void write_pixels(const std::string& path, float aspect, const Look& look) {
         for (int x = 0; x < width; ++x) {
             glm::vec3 sum(0.0f);
             for (int i = 0; i < samples; ++i) {
-                const float right = static_cast<float>(i % side), low = static_cast<float>(i / side);
-                const float px = static_cast<float>(x) + part * (right + 0.5f),
-                            py = static_cast<float>(y) + part * (low + 0.5f);
+                const int right = i % side, low = i / side;
+                const float px = static_cast<float>(x) + part * (static_cast<float>(right) + 0.5f),
+                            py = static_cast<float>(y) + part * (static_cast<float>(low) + 0.5f);
                 // The noise lies in another part of the square than the sample: an edge has all parts on both sides.
-                const float part_x = static_cast<float>((i / side + x) % side),
-                            part_y = static_cast<float>((i % side + y) % side);
-                const glm::vec2 within(part * (part_x + noise()), part * (part_y + noise()));
+                const int part_x = (low + x) % side, part_y = (right + y) % side;
+                const glm::vec2 within(part * (static_cast<float>(part_x) + noise()),
+                                       part * (static_cast<float>(part_y) + noise()));
                 const glm::vec3 c = look(px / static_cast<float>(width), py / static_cast<float>(height), within);
                 sum += glm::pow(glm::clamp(c, 0.0f, 1.0f), glm::vec3(1.0f / 2.2f));
             }
