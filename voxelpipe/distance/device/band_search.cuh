@@ -111,7 +111,7 @@ struct octant_item {
 // octants of a brick differ in their work, so warps wait for each other in long lists alone.
 template <int = 0>
 __global__ __launch_bounds__(threads_per_block,
-                             search_blocks) void search_band(const __grid_constant__ distance_input in,
+                             band_search_blocks) void search_band(const __grid_constant__ distance_input in,
                                                              const __grid_constant__ band_memory m,
                                                              const __grid_constant__ found_samples to,
                                                              pipeline_state* state, capacities limits) {
