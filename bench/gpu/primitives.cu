@@ -122,7 +122,7 @@ void add(table& rows, const row& r) {
 int main(int argc, char** argv) {
     gpu::run_options how;
     gpu::command command("bench_gpu_primitives", "Sorts and prefix sums of the library beside CUB's.", how,
-                         "primitives.{md,csv}");
+                         "gpu_primitives.md and gpu_primitives.csv");
     return command.run(argc, argv, [&](const std::string& typed) {
         gpu::session s;
         gpu::clock_watch watch;
@@ -136,7 +136,7 @@ int main(int argc, char** argv) {
         }
         watch.read();
         gpu::write_report(
-            how, {"Sorts and prefix sums beside CUB's", "primitives", "CUDA graphs between two events", {}, {}, {}},
+            how, {"Sorts and prefix sums beside CUB's", "gpu_primitives", "CUDA graphs between two events", {}, {}, {}},
             watch, typed, rows);
         return 0;
     });
