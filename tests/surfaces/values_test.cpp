@@ -202,6 +202,33 @@ TEST(SurfaceValues, FragmentsNameDrawInstanceAndTriangle) {
     }
 }
 
+// Whichever way triangles face.
+TEST(SurfaceValues, NormalsLookOutward) {
+    struct normals {
+        VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const { return vp::outputs(f.normal); }
+    };
+    vp::cpu_backend backend{2};
+    host_mesh b = ball(glm::vec3(0.5f), 0.31f, 3);
+    for (std::size_t i = 0; i < b.triangles.size(); i += 2) {
+        glm::uvec3& t = b.triangles[i];
+        t = glm::uvec3(t.x, t.z, t.y);
+    }
+    const vp::mesh<vp::cpu_backend> m{backend, b.positions, b.triangles};
+    for (const double level : {0.0, 0.06, -0.06}) {
+        vp::surface<vp::cpu_backend, glm::vec3> s(backend);
+        const vp::remesh_options o{.rule = vp::fill_rule::even_odd, .level = level};
+        ASSERT_TRUE(vp::remesh(backend, m, value_grid(20), vp::passthrough{}, normals{}, s, o).ok());
+        const auto vertices = s.vertices.to_host(backend);
+        const auto n = vp::get<0>(s).to_host(backend);
+        ASSERT_GT(n.size(), 200u);
+        for (std::size_t v = 0; v < n.size(); ++v) {
+            const glm::dvec3 p = vp::position(s.samples, vertices[v]);
+            const double along = (p.x - 0.5) * n[v].x + (p.y - 0.5) * n[v].y + (p.z - 0.5) * n[v].z;
+            ASSERT_GT(along, 0.95 * (0.31 + level) * 0.97) << level;
+        }
+    }
+}
+
 // What a shader discards counts as no crossing.
 TEST(SurfaceValues, DiscardedCrossingsDoNotCount) {
     vp::cpu_backend backend{2};

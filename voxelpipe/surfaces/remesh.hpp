@@ -191,12 +191,13 @@ struct surface_shading {
     Backend& backend;
     std::span<const draw<Mesh, VertexShader, Shader>> draws;
     const grid& where;
+    double level;
     surface<Backend, Values...>& made;
 
     status operator()(const passes::mesh_triangles& triangles, const surface_cells<Backend>* cells,
                       const edge_crossing* crossings, surface_counters& counts) const {
         if constexpr (has_values)
-            return shade_surface(backend, draws, where, triangles, cells, crossings, made, counts);
+            return shade_surface(backend, draws, where, triangles, cells, crossings, level, made, counts);
         else
             return {};
     }
@@ -231,11 +232,11 @@ template <class Mesh, class VertexShader, class Shader, class... Values>
 // made_crossings. Returns after the work is done. A call that fails leaves `out` as it is.
 //
 // With values in the surface, draw::fragment_shader makes them; without, it is ignored. Its fragment is that of a
-// crossing: `barycentric` is exact there, `voxel` the lower sample of the crossed edge. Each crossing is shaded once,
-// and a vertex has the mean of its crossings' floats, and the integer that most of them have, of several the least.
-// Crossings without a triangle, or that the shader discards, do not count. A vertex without any that counts, and at a
-// level every vertex, has the values of the nearest triangle of all draws at its closest point, with the vertex's cell
-// as `voxel` (surface_counters::nearest_values); zeros where the shader discards that.
+// crossing: `barycentric` is exact there, `voxel` the lower sample of the crossed edge, and `normal` looks outward.
+// Each crossing is shaded once, and a vertex has the mean of its crossings' floats, and the integer that most of them
+// have, of several the least. Crossings without a triangle, or that the shader discards, do not count. A vertex without
+// any that counts, and at a level every vertex, has the values of the nearest triangle of all draws at its closest
+// point, with the vertex's cell as `voxel` (surface_counters::nearest_values); zeros where the shader discards that.
 template <class Backend, class Mesh, class VertexShader, class Shader, class... Values>
 [[nodiscard]] status remesh(Backend& backend, std::span<const draw<Mesh, VertexShader, Shader>> draws, const grid& g,
                             surface<Backend, Values...>& out, const remesh_options& options = {}) {
@@ -245,7 +246,8 @@ template <class Backend, class Mesh, class VertexShader, class Shader, class... 
         if (const status s = core::validate_draws(draws); !s.ok()) return s;
         return backend.guard([&]() -> status {
             surface<Backend, Values...> made(backend);
-            const core::surface_shading<Backend, Mesh, VertexShader, Shader, Values...> shade{backend, draws, g, made};
+            const core::surface_shading<Backend, Mesh, VertexShader, Shader, Values...> shade{backend, draws, g,
+                                                                                              options.level, made};
             status result;
             if (options.level != 0.0) {
                 std::vector<draw<Mesh, VertexShader, distance>> measured;

@@ -73,9 +73,11 @@ struct mesh_shading {
         if (sorted_primitives == nullptr) return primitive;
         return triangles_by_number[count_below(sorted_primitives, mesh.drawn, primitive)];
     }
-    // The draw's shader's output for triangle t of a draw, at the point with these weights.
+    // The draw's shader's output for triangle t of a draw, at the point with these weights. turns: the outside is
+    // behind the triangle.
     VOXELPIPE_ANY_CALLABLE
-    [[nodiscard]] VOXELPIPE_HD auto shade(std::uint32_t t, const glm::vec3& weights, const glm::ivec3& sample) const {
+    [[nodiscard]] VOXELPIPE_HD auto shade(std::uint32_t t, const glm::vec3& weights, const glm::ivec3& sample,
+                                          bool turns) const {
         const std::uint32_t d = bisect_last(0u, num_draws, [&](std::uint32_t i) { return draws[i].first <= t; });
         const shaded_draw<Shader>& of = draws[d];
         const auto at = static_cast<std::uint32_t>(t - of.first);
@@ -98,6 +100,7 @@ struct mesh_shading {
             place(make_frame<std::int64_t>(a, b, c, fraction));
         else
             place(make_frame<int128>(a, b, c, fraction));
+        if (turns) f.normal = glm::vec3(-f.normal.x, -f.normal.y, -f.normal.z);
         f.voxel = glm::ivec3(sample.x + offset.x, sample.y + offset.y, sample.z + offset.z);
         f.barycentric = weights;
         for (int i = 0; i < 3; ++i) {

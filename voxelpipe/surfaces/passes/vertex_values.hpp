@@ -29,12 +29,16 @@ struct crossing_value {
     bool is_known; // false: there is no triangle, or the shader has discarded it
 };
 
-// The weights of the triangle a b c at the sample's row along `axis`, which meets it: quotients of exact integers,
-// below 2^84, each rounded to double, and the quotient to float. The row's offset is no distance, so that no weight is
-// negative.
-[[nodiscard]] VOXELPIPE_HD inline glm::vec3 weights_on_row(const snapped_position& a, const snapped_position& b,
-                                                           const snapped_position& c, int axis,
-                                                           const snapped_position& sample) {
+// Where a row along an axis meets a triangle.
+struct row_weights {
+    glm::vec3 weights; // of its vertices; none is negative
+    bool looks_up;     // its normal's component along the axis is positive
+};
+// Of the sample's row along `axis`, which meets the triangle a b c: quotients of exact integers, below 2^84, each
+// rounded to double, and the quotient to float. The row's offset is no distance.
+[[nodiscard]] VOXELPIPE_HD inline row_weights weights_on_row(const snapped_position& a, const snapped_position& b,
+                                                             const snapped_position& c, int axis,
+                                                             const snapped_position& sample) {
     const auto flat = [&](const snapped_position& p) {
         return to_uvw<std::int64_t>(axis, p.x - sample.x, p.y - sample.y, p.z - sample.z);
     };
@@ -42,11 +46,11 @@ struct crossing_value {
     const auto area = [&](int i, int j) {
         return static_cast<int128>(v[i][0]) * v[j][1] - static_cast<int128>(v[i][1]) * v[j][0];
     };
-    const int128 of_a = area(1, 2), of_b = area(2, 0), of_c = area(0, 1);
-    const double all = exact::to_double(of_a + of_b + of_c);
-    return {exact::to_float(exact::div(exact::to_double(of_a), all)),
-            exact::to_float(exact::div(exact::to_double(of_b), all)),
-            exact::to_float(exact::div(exact::to_double(of_c), all))};
+    const int128 of_a = area(1, 2), of_b = area(2, 0), of_c = area(0, 1), all = of_a + of_b + of_c;
+    const auto weight = [&](int128 part) {
+        return exact::to_float(exact::div(exact::to_double(part), exact::to_double(all)));
+    };
+    return {{weight(of_a), weight(of_b), weight(of_c)}, all > 0};
 }
 
 // Shades the crossings of the edges that begin at the lowest sample of cell i.
@@ -66,7 +70,7 @@ struct shade_crossings {
         std::uint64_t next = cells.first_edges[cell];
         for (int axis = 0; axis < 3; ++axis) {
             if (!is_crossed(corners, 4 * axis)) continue;
-            values[next] = shade(crossings[next].triangle, axis, first);
+            values[next] = shade(crossings[next].triangle, axis, first, (corners & 1) != 0);
             ++next;
         }
     }
@@ -74,16 +78,15 @@ struct shade_crossings {
 private:
     VOXELPIPE_ANY_CALLABLE
     [[nodiscard]] VOXELPIPE_HD crossing_value<Values...> shade(std::uint32_t triangle, int axis,
-                                                               const glm::ivec3& first) const {
+                                                               const glm::ivec3& first, bool goes_out) const {
         if (triangle >= shading.mesh.drawn) return {};
         const std::int64_t half = std::int64_t{1} << (shading.fraction - 1);
         const auto centre = [&](int v) { return static_cast<std::int64_t>(v) * 2 * half + half; };
         const snapped_position sample{centre(first.x), centre(first.y), centre(first.z)};
         const glm::uvec3 t = shading.mesh.triangles[triangle];
-        const auto out = shading.shade(triangle,
-                                       weights_on_row(shading.mesh.positions[t.x], shading.mesh.positions[t.y],
-                                                      shading.mesh.positions[t.z], axis, sample),
-                                       first);
+        const row_weights w = weights_on_row(shading.mesh.positions[t.x], shading.mesh.positions[t.y],
+                                             shading.mesh.positions[t.z], axis, sample);
+        const auto out = shading.shade(triangle, w.weights, first, w.looks_up != goes_out);
         return {out.values, out.keep};
     }
 };
@@ -161,6 +164,7 @@ struct shade_nearest {
     const glm::vec3* points;
     const std::int64_t* nearest;
     const surface_vertex* vertices;
+    int outside; // 1: the outside is where the vertices lie, seen from the triangles; -1: beyond
     value_arrays<Values...> out;
 
     VOXELPIPE_ANY_CALLABLE
@@ -175,7 +179,7 @@ struct shade_nearest {
                                                 shading.mesh.positions[c.z], snap(snapping, p.x, p.y, p.z));
             const triple<double> w = closest_weights(seen, scale, find_distance(seen, scale).region);
             const auto shaded = shading.shade(t, {exact::to_float(w[0]), exact::to_float(w[1]), exact::to_float(w[2])},
-                                              vertices[v].cell);
+                                              vertices[v].cell, side_of(seen) * outside < 0);
             if (shaded.keep) values = shaded.values;
         }
         for_each_index<sizeof...(Values)>(
@@ -186,11 +190,11 @@ struct shade_nearest {
 } // namespace passes
 
 // The values of a surface that has been made. `asked` are the draws with their fragment shaders, `g` the grid of the
-// call. cells and crossings: null for a level, whose vertices all take the nearest triangle's value.
+// call. cells and crossings: null for a level other than 0, whose vertices all take the nearest triangle's value.
 template <class Backend, class Mesh, class VertexShader, class Shader, class... Values>
 [[nodiscard]] status shade_surface(Backend& backend, std::span<const draw<Mesh, VertexShader, Shader>> asked,
                                    const grid& g, const passes::mesh_triangles& mesh,
-                                   const surface_cells<Backend>* cells, const edge_crossing* crossings,
+                                   const surface_cells<Backend>* cells, const edge_crossing* crossings, double level,
                                    surface<Backend, Values...>& made, surface_counters& counts) {
     using shading_type = gathered_shading<Backend, Mesh, VertexShader, Shader>;
     using view_type = typename shading_type::view_type;
@@ -231,7 +235,7 @@ template <class Backend, class Mesh, class VertexShader, class Shader, class... 
                      passes::shade_nearest<view_type, Values...>{
                          shading.view(), make_snap_transform(made.samples),
                          make_distance_scale(made.samples.voxel_size, made.samples.fraction()), listed.data(),
-                         points.data(), nearest.data(), made.vertices.data(), out});
+                         points.data(), nearest.data(), made.vertices.data(), level < 0.0 ? -1 : 1, out});
     return {};
 }
 
