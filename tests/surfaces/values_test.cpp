@@ -229,6 +229,19 @@ TEST(SurfaceValues, NormalsLookOutward) {
     }
 }
 
+// Closed meshes that reach the grid's faces, in grids of every size.
+TEST(SurfaceValues, ClosedMeshesHaveTheirOwnCrossingsInGridsOfAnySize) {
+    vp::cpu_backend backend{2};
+    const host_mesh m = ball(glm::vec3(0.0f), 1.0f, 3);
+    const glm::dvec3 one(1.0);
+    for (int n = 2; n <= 66; ++n) {
+        const vp::grid g = vp::fit(vp::bounding_box{-one, one}, glm::ivec3(n));
+        const host_values s = remesh_with_values(backend, m, g, {.place = vp::place::mean});
+        ASSERT_EQ(s.mesh.status.surface.made_crossings, 0u) << n;
+        ASSERT_EQ(s.mesh.status.surface.nearest_values, 0u) << n;
+    }
+}
+
 // What a shader discards counts as no crossing.
 TEST(SurfaceValues, DiscardedCrossingsDoNotCount) {
     vp::cpu_backend backend{2};
