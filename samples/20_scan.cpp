@@ -128,11 +128,11 @@ int main() {
     const std::vector<glm::vec3> colors = vp::get<0>(made).to_host(backend);
     // end snippet
     const vp::surface_counters& counts = status.surface;
-    std::printf("%zu triangles; %llu holes, %llu crumbs; %llu vertices in %llu part, %llu with the nearest colour\n",
-                input.triangles.size(), static_cast<unsigned long long>(status.solid.holes),
-                static_cast<unsigned long long>(counts.components_left_out),
-                static_cast<unsigned long long>(counts.vertices), static_cast<unsigned long long>(counts.components),
-                static_cast<unsigned long long>(counts.nearest_values));
+    std::printf(
+        "%zu triangles; %llu holes, %llu loose parts; %llu vertices in %llu part, %llu with the nearest colour\n",
+        input.triangles.size(), static_cast<unsigned long long>(status.solid.holes),
+        static_cast<unsigned long long>(counts.components_left_out), static_cast<unsigned long long>(counts.vertices),
+        static_cast<unsigned long long>(counts.components), static_cast<unsigned long long>(counts.nearest_values));
 
     mesh_picture::mesh output;
     output.triangles = made.triangles.to_host(backend);
@@ -143,9 +143,9 @@ int main() {
     mesh_picture::mesh both;
     both.add(input, glm::vec3(-1.02f, 0.0f, 0.0f));
     both.add(output, glm::vec3(1.02f, 0.0f, 0.0f));
-    const mesh_picture::scene scene(both, {-0.35f, -0.45f, -1.0f}, 1.28f, 2.0f);
+    const mesh_picture::scene scene(both, {-0.05f, -0.42f, -1.0f}, 1.14f, 2.0f);
     picture::write_pixels("scan_remesh.ppm", 2.0f,
                           [&](float x, float y, const glm::vec2& noise) { return scene.look(x, y, noise); });
-    return closed && counts.components == 1 && counts.components_left_out >= 12 && colors.size() == counts.vertices ? 0
-                                                                                                                    : 1;
+    return closed && counts.components == 1 && counts.components_left_out > 0 && colors.size() == counts.vertices ? 0
+                                                                                                                  : 1;
 }
