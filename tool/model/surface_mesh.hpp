@@ -20,7 +20,9 @@ struct surface_mesh {
     std::vector<glm::uvec3> triangles; // counter-clockwise seen from outside; empty where there are quads
     std::vector<glm::uvec4> quads;
     std::vector<std::uint32_t>
-        sources; // number of a triangle of the model that each vertex comes from; UINT32_MAX: none
+        sources;                    // number of a triangle of the model that each vertex comes from; UINT32_MAX: none
+    std::vector<glm::vec3> normals; // of the vertices: unit, outward
+    std::vector<glm::vec3> colors;  // of the vertices: linear, 0 to 1; empty: there are none
     voxelpipe::surface_counters counts;
 
     [[nodiscard]] std::size_t num_faces() const { return triangles.size() + quads.size(); }
