@@ -227,12 +227,70 @@ __global__ __launch_bounds__(threads_per_block) void shade_samples_kernel(
     totals.add_up(count_voxels, state);
 }
 
+// The same for the ready shader and one target of floats that are replaced, whose rows are aligned to 16 bytes: a lane
+// writes four samples, so that memory is what limits a large grid.
+template <int = 0>
+__global__ __launch_bounds__(threads_per_block) void store_field_kernel(const __grid_constant__ distance_input in,
+                                                                        const __grid_constant__ found_samples found,
+                                                                        const __grid_constant__ inside_rows inside,
+                                                                        float* to, bool count_voxels,
+                                                                        pipeline_state* state, capacities limits) {
+    if (has_failed(*state, limits)) return;
+    constexpr int each = 4, step = 32 * each, bricks = step / distance_brick;
+    const int lane = static_cast<int>(threadIdx.x % 32);
+    const auto runs_x = static_cast<std::uint64_t>(sample_run::count(in.extent.x)),
+               ny = static_cast<std::uint64_t>(in.extent.y);
+    const std::uint64_t num = runs_x * ny * static_cast<std::uint64_t>(in.extent.z),
+                        warps = std::uint64_t{gridDim.x} * blockDim.x / 32;
+    sample_totals totals;
+    for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x / 32 + warp_in_block(); i < num; i += warps) {
+        const std::uint64_t row = i / runs_x;
+        const int first = static_cast<int>(i % runs_x) * sample_run::samples, y = static_cast<int>(row % ny),
+                  z = static_cast<int>(row / ny);
+        const sample_run run = sample_run::of(in, found, first / sample_run::samples, y, z);
+        for (int part = 0; part < sample_run::samples / step; ++part) {
+            const int x = first + part * step + each * lane;
+            const std::uint64_t slot = __shfl_sync(0xffffffffu, run.slot, part * bricks + each * lane / distance_brick);
+            if (x >= in.extent.x) continue;
+            float4 length{in.band, in.band, in.band, in.band};
+            if (slot != found_samples::nowhere) {
+                const std::uint64_t from = found_samples::place(slot, x, y, z);
+                length = *reinterpret_cast<const float4*>(found.distances + from);
+                const uint4 nearest = *reinterpret_cast<const uint4*>(found.primitives + from);
+                totals.in_band += static_cast<unsigned>(nearest.x != no_primitive) +
+                                  static_cast<unsigned>(nearest.y != no_primitive) +
+                                  static_cast<unsigned>(nearest.z != no_primitive) +
+                                  static_cast<unsigned>(nearest.w != no_primitive);
+            }
+            const word inner = inside.row(x, y, z) >> x % 32;
+            const auto value = [&](float distance, int k) VOXELPIPE_INLINE_LAMBDA {
+                return (inner >> k & 1u) != 0 && distance > 0.0f ? -distance : distance;
+            };
+            totals.fragments += each;
+            *reinterpret_cast<float4*>(to + row * static_cast<std::uint64_t>(in.extent.x) + x) = {
+                value(length.x, 0), value(length.y, 1), value(length.z, 2), value(length.w, 3)};
+        }
+    }
+    totals.add_up(count_voxels, state);
+}
+
 template <class Shading, class Framebuffer>
 void shade_samples(const distance_input& in, const Shading& s, const found_samples& found, const inside_rows& inside,
                    const Framebuffer& fb, bool count_voxels, pipeline_state* state, const capacities& limits,
                    cudaStream_t stream) {
     const std::uint64_t runs = static_cast<std::uint64_t>(sample_run::count(in.extent.x)) *
                                static_cast<std::uint64_t>(in.extent.y) * static_cast<std::uint64_t>(in.extent.z);
+    using field = framebuffer_view<target<float, blend::replace>>;
+    if constexpr (std::is_same_v<typename Shading::shader_type, distance> && std::is_same_v<Framebuffer, field>) {
+        const auto& t = voxelpipe::get<0>(fb.targets);
+        if (t.load != load_operation::off && in.extent.x % 4 == 0 &&
+            reinterpret_cast<std::uintptr_t>(t.elements) % sizeof(float4) == 0) {
+            store_field_kernel<0><<<fill_device(runs * 32), threads_per_block, 0, stream>>>(
+                in, found, inside, t.elements, count_voxels, state, limits);
+            check(cudaGetLastError(), stage::tile_resolve);
+            return;
+        }
+    }
     shade_samples_kernel<Shading, Framebuffer><<<fill_device(runs * 32), threads_per_block, 0, stream>>>(
         in, s, found, inside, fb, count_voxels, state, limits);
     check(cudaGetLastError(), stage::tile_resolve);
