@@ -227,7 +227,7 @@ __global__ __launch_bounds__(threads_per_block) void shade_samples_kernel(
     totals.add_up(count_voxels, state);
 }
 
-// The same for the ready shader and one target of floats that are replaced, whose rows are aligned to 16 bytes: a lane
+// Stores the distances of the ready shader into one target of floats that are replaced, aligned to 16 bytes: a lane
 // writes four samples, so that memory is what limits a large grid.
 template <int = 0>
 __global__ __launch_bounds__(threads_per_block) void store_field_kernel(const __grid_constant__ distance_input in,
