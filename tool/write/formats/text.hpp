@@ -22,7 +22,7 @@ namespace voxelize {
     const auto end = std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed, digits).ptr;
     return {text.data(), end};
 }
-// Of byte / 255, short but exact enough to give the byte back.
+// The text of byte / 255, short but exact enough to give the byte back.
 [[nodiscard]] inline std::string fraction_text(int byte) { return decimal(byte / 255.0, 4); }
 
 } // namespace voxelize
