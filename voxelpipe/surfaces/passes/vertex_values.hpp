@@ -34,7 +34,7 @@ struct row_weights {
     glm::vec3 weights; // of its vertices; none is negative
     bool looks_up;     // its normal's component along the axis is positive
 };
-// Weights of the point where the sample's row along `axis` meets the triangle a b c: quotients of exact integers, below
+// The weights at the sample's row along `axis`, which meets the triangle a b c: quotients of exact integers, below
 // 2^84, each rounded to double, and the quotient to float. The row's offset is no distance.
 [[nodiscard]] VOXELPIPE_HD inline row_weights weights_on_row(const snapped_position& a, const snapped_position& b,
                                                              const snapped_position& c, int axis,
