@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "../../src/value_rows.hpp"
 #include "on_device.cuh"
+
+#include <bindings/value_rows.hpp>
 
 #include <memory>
 

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-#include "../../src/parts.hpp"
 #include "on_device.cuh"
 
+#include <bindings/parts.hpp>
 #include <voxelpipe/solid/diagnose_repair.hpp>
 
 namespace voxelpipe::python {
