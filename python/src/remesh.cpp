@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #include "arrays.hpp"
-#include "parts.hpp"
 #include "report.hpp"
 
+#include <bindings/parts.hpp>
 #include <voxelpipe/surfaces/remesh.hpp>
 
 #include <nanobind/stl/optional.h>
