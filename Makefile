@@ -7,6 +7,7 @@
 #   make test                                     builds everything and runs the tests
 #   make docs                                     the site, in build/docs/html
 #   make dist                                     the source archive, in build/dist
+#   make wheels                                   wheels of the Python package that need no compiler, in build/wheels/dist
 #   make bench                                    the CPU table
 #   make bench-gpu                                the GPU table (needs nvcc and a GPU); make bench-scaling: its curves
 #   make clean                                    removes build/ and demo/
@@ -14,7 +15,7 @@
 MODEL ?=
 RESOLUTION ?= 256
 
-.PHONY: demo test docs dist bench bench-gpu bench-scaling bench-tune clean
+.PHONY: demo test docs dist wheels bench bench-gpu bench-scaling bench-tune clean
 .DEFAULT_GOAL := demo
 
 demo:
@@ -28,6 +29,9 @@ docs:
 
 dist:
 	@scripts/dist.sh
+
+wheels:
+	@scripts/wheels.sh
 
 bench:
 	@scripts/bench.sh

@@ -32,6 +32,7 @@ REPORTS = {
     "gpu_programs.md": {"gpu_programs.csv": "programs.csv"},
     "gpu_sparse.md": {"gpu_sparse.csv": "sparse.csv", "gpu_octrees.csv": "octrees.csv"},
     "gpu_computed.md": {"gpu_computed.csv": "computed.csv"},
+    "gpu_primitives.md": {"gpu_primitives.csv": "primitives.csv"},
     "gpu_distance.md": {"gpu_distance.csv": "distance.csv"},
     "cpu_sparse.md": {"cpu_sparse.csv": "sparse.csv"},
     "cpu_processor_time.md": {"cpu_processor_time.csv": "processor_time.csv"},

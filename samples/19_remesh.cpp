@@ -3,16 +3,13 @@
 // A closed mesh out of triangle soup: a bracket of parts that cross each other, one of them open, becomes
 // one closed surface that keeps its creases (remesh.ppm; right of it the same with rounded ones). Checks that
 // every edge has two faces, and prints what was made.
-#include "picture.hpp"
+#include "mesh_picture.hpp"
 
 #include <cpu_ref/backend.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
-#include <utility>
 #include <vector>
 
 namespace vp = voxelpipe;
@@ -44,79 +41,6 @@ struct soup {
         }
     }
 };
-
-// The triangles of a surface, lit, as seen from a corner.
-class shot {
-public:
-    shot(const vp::surface<vp::cpu_backend>& s, vp::cpu_backend& backend, int side, const glm::vec3& middle, float size)
-        : side_(side),
-          depth_(static_cast<std::size_t>(side) * static_cast<std::size_t>(side), -std::numeric_limits<float>::max()),
-          light_(depth_.size()) {
-        const glm::vec3 look = glm::normalize(glm::vec3(0.62f, 0.48f, 0.75f));
-        const glm::vec3 right = glm::normalize(glm::cross(glm::vec3(0, 1, 0), look)), up = glm::cross(look, right);
-        std::vector<glm::vec3> seen;
-        for (const vp::surface_vertex& v : s.vertices.to_host(backend)) {
-            const glm::vec3 p = (glm::vec3(vp::position(s.samples, v)) - middle) / size;
-            seen.emplace_back(glm::dot(p, right), glm::dot(p, up), glm::dot(p, look));
-        }
-        for (const glm::uvec3& t : s.triangles.to_host(backend)) draw(seen[t.x], seen[t.y], seen[t.z]);
-    }
-    // Light at a place of the picture; below 0: nothing is there.
-    [[nodiscard]] float at(float x, float y) const {
-        const int i = static_cast<int>(x * static_cast<float>(side_)),
-                  j = static_cast<int>(y * static_cast<float>(side_));
-        if (i < 0 || j < 0 || i >= side_ || j >= side_ || depth_[index(i, j)] == -std::numeric_limits<float>::max())
-            return -1.0f;
-        return light_[index(i, j)];
-    }
-
-private:
-    [[nodiscard]] std::size_t index(int i, int j) const {
-        return static_cast<std::size_t>(j) * static_cast<std::size_t>(side_) + static_cast<std::size_t>(i);
-    }
-    void draw(glm::vec3 a, glm::vec3 b, glm::vec3 c) {
-        const glm::vec3 n = glm::normalize(glm::cross(b - a, c - a));
-        if (!(n.z > 0.0f)) return;
-        const float light = 0.25f + 0.75f * std::max(0.0f, glm::dot(n, glm::normalize(glm::vec3(-0.5f, 0.7f, 0.6f))));
-        for (glm::vec3* const p : {&a, &b, &c}) {
-            p->x = (0.5f + 0.5f * p->x) * static_cast<float>(side_);
-            p->y = (0.5f + 0.5f * p->y) * static_cast<float>(side_);
-        }
-        const auto cross = [](const glm::vec3& p, const glm::vec3& q, float x, float y) {
-            return (q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x);
-        };
-        const float area = cross(a, b, c.x, c.y);
-        if (!(area > 0.0f)) return;
-        for (int j = static_cast<int>(std::min({a.y, b.y, c.y})); j <= static_cast<int>(std::max({a.y, b.y, c.y})); ++j)
-            for (int i = static_cast<int>(std::min({a.x, b.x, c.x})); i <= static_cast<int>(std::max({a.x, b.x, c.x}));
-                 ++i) {
-                if (i < 0 || j < 0 || i >= side_ || j >= side_) continue;
-                const float x = static_cast<float>(i) + 0.5f, y = static_cast<float>(j) + 0.5f;
-                const float u = cross(b, c, x, y), v = cross(c, a, x, y), w = cross(a, b, x, y);
-                if (u < 0.0f || v < 0.0f || w < 0.0f) continue;
-                const float depth = (u * a.z + v * b.z + w * c.z) / area;
-                if (depth <= depth_[index(i, j)]) continue;
-                depth_[index(i, j)] = depth;
-                light_[index(i, j)] = light;
-            }
-    }
-
-    int side_;
-    std::vector<float> depth_, light_;
-};
-
-// True if every edge has one face on either side.
-bool is_closed(const std::vector<glm::uvec3>& triangles) {
-    std::vector<std::pair<unsigned, unsigned>> edges;
-    for (const glm::uvec3& t : triangles)
-        for (const auto& [a, b] : {std::pair(t.x, t.y), std::pair(t.y, t.z), std::pair(t.z, t.x)})
-            edges.emplace_back(a, b);
-    std::sort(edges.begin(), edges.end());
-    if (std::adjacent_find(edges.begin(), edges.end()) != edges.end()) return false;
-    return std::all_of(edges.begin(), edges.end(), [&](const auto& e) {
-        return std::binary_search(edges.begin(), edges.end(), std::pair(e.second, e.first));
-    });
-}
 
 int main() {
     soup part;
@@ -150,17 +74,22 @@ int main() {
                 static_cast<unsigned long long>(status.surface.faces),
                 static_cast<unsigned long long>(status.surface.components));
     // end snippet
-    const std::vector<glm::uvec3> triangles = sharp.triangles.to_host(backend);
-    const bool closed = is_closed(triangles) && is_closed(mean.triangles.to_host(backend));
+    mesh_picture::mesh both;
+    bool closed = true;
+    for (const auto* const s : {&sharp, &mean}) {
+        mesh_picture::mesh m;
+        for (const vp::surface_vertex& v : s->vertices.to_host(backend))
+            m.positions.emplace_back(vp::position(s->samples, v));
+        m.triangles = s->triangles.to_host(backend);
+        m.colors.assign(m.positions.size(), glm::vec3(0.80f, 0.42f, 0.11f));
+        closed = closed && mesh_picture::is_closed(m.triangles);
+        both.add(m, s == &mean ? glm::vec3(40.0f, 0.0f, -20.0f) : glm::vec3(-40.0f, 0.0f, 20.0f));
+    }
     std::printf("closed: %s, crossings on closed holes: %llu, made up: %llu\n", closed ? "yes" : "no",
                 static_cast<unsigned long long>(status.surface.cone_crossings),
                 static_cast<unsigned long long>(status.surface.made_crossings));
-
-    const shot left(sharp, backend, 1200, glm::vec3(0, -1, 0), 41.0f),
-        right(mean, backend, 1200, glm::vec3(0, -1, 0), 41.0f);
-    picture::write_pixels("remesh.ppm", 2.0f, [&](float x, float y, const glm::vec2&) {
-        const float light = x < 0.5f ? left.at(2.0f * x, 1.0f - y) : right.at(2.0f * x - 1.0f, 1.0f - y);
-        return light < 0.0f ? glm::vec3(0.93f) : light * glm::vec3(0.93f, 0.68f, 0.36f);
-    });
+    const mesh_picture::scene scene(both, {-0.5f, -0.6f, -1.0f}, 1.07f, 2.0f);
+    picture::write_pixels("remesh.ppm", 2.0f,
+                          [&](float x, float y, const glm::vec2& noise) { return scene.look(x, y, noise); });
     return closed && status.surface.components == 1 && status.surface.made_crossings == 0 ? 0 : 1;
 }

@@ -40,9 +40,9 @@ at_most 220 "$(wc -l <voxelpipe/device/backend.cuh)" "lines of voxelpipe/device/
 no grep -qE 'run_(solid|sparse)|draw_(elements|patches)|solid\.hpp|sparse\.hpp|program\.hpp' voxelpipe/device/backend.cuh
 ok scripts/check_includes.py
 ok scripts/check_includes.py --depth 30
-# The next step switches these on: CUB in the library's kernels, Thrust in a sample.
-# ok git grep -qE '<cub/' -- 'voxelpipe/*_kernels.cuh'
-# ok git grep -qE '<thrust/' -- samples
+# CUB in the library's kernels, Thrust in a sample.
+ok git grep -qE '<cub/' -- 'voxelpipe/*_kernels.cuh'
+ok git grep -qE '<thrust/' -- samples
 
 # Comments are sentences with their nouns.
 at_most 10 "$(matches -hE '(// Of [a-z]|// The same (of|for) |//.*(so many|what is no |is none|none where))' \

@@ -40,8 +40,10 @@ tag=$("$python" -c 'import sys; v = sys.version_info; print(f"cp3{v.minor}-cp3{v
 
 say "testing it"
 cd "$folder" # away from the folder that holds headers of the package's name
-# What is baked of models is compared with the tool, where stage test has built that.
-[[ ! -x $root/build/test/tool/voxelize ]] || export VOXELPIPE_TOOL=$root/build/test/tool/voxelize
+# What is baked of models is compared with the tool that the wheel brings.
+VOXELPIPE_TOOL=$("$python" -c 'import pathlib, voxelpipe; print(pathlib.Path(voxelpipe.__file__).parent / "bin/voxelize")')
+export VOXELPIPE_TOOL
+[[ -x $VOXELPIPE_TOOL ]] || die "the wheel has no tool"
 "$python" -m pytest -q "$root/python/tests"
 # Tensors, where the distribution's Python has torch (Debian's python3-torch is a download of 47 MB; wheels of PyPI bring CUDA).
 system=/usr/bin/python3

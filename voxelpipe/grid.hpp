@@ -189,21 +189,21 @@ struct bounding_box {
     double size = 0.0;
     for (int a = 0; a < 3; ++a) {
         if (extent[a] <= 0) continue;
-        const double side = (hi[a] - lo[a]) * std::fma(2.0, margin, 1.0);
+        const double side = (hi[a] - lo[a]) * exact::fma(2.0, margin, 1.0);
         size = std::max(size, side / extent[a]);
     }
     if (!(size > 0.0)) size = 1.0;
     grid g;
     g.extent = extent;
     g.voxel_size = glm::dvec3(size);
-    for (int a = 0; a < 3; ++a) g.origin[a] = std::fma(-0.5 * extent[a], size, 0.5 * (lo[a] + hi[a]));
+    for (int a = 0; a < 3; ++a) g.origin[a] = exact::fma(-0.5 * extent[a], size, 0.5 * (lo[a] + hi[a]));
     return g;
 }
 
 // A centred grid of n cubic voxels along the longest side of a box, and as few as hold the box along the others; with
 // the margin of fit(). n < 1 gives a grid that calls refuse as bad_extent.
 [[nodiscard]] inline grid fit_longest(const bounding_box& box, int n, double margin = 1e-4) {
-    const glm::dvec3 side = box.empty() ? glm::dvec3(0.0) : (box.high - box.low) * std::fma(2.0, margin, 1.0);
+    const glm::dvec3 side = box.empty() ? glm::dvec3(0.0) : (box.high - box.low) * exact::fma(2.0, margin, 1.0);
     const double longest = std::max({side.x, side.y, side.z});
     glm::ivec3 extent(n);
     for (int a = 0; a < 3 && longest > 0.0; ++a)

@@ -137,6 +137,7 @@ struct surface_counters {
     std::uint64_t cone_crossings = 0;      // edges that the surface crosses on a cone of close_holes
     std::uint64_t made_crossings = 0;      // edges without a crossing of mesh or field, crossed in their middle
     std::uint64_t nan_samples = 0;         // of a field, which are outside
+    std::uint64_t nearest_values = 0;      // vertices with the values of the nearest triangle, for want of a crossing's
 
     friend bool operator==(const surface_counters&, const surface_counters&) = default;
 };

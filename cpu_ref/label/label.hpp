@@ -93,7 +93,7 @@ public:
             }
             for (; left != 0; left &= left - 1) {
                 const number v = first + static_cast<number>(exact::lowest_one(left));
-                root = sets_.root(v);
+                root = sets_.find(v);
                 if (root != v) {
                     sets_.set_root(v, root);
                     continue;

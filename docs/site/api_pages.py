@@ -66,6 +66,7 @@ TASKS = [
     ("A mesh with holes", "samples/guide/solids.cpp", "holes", "solids"),
     ("Distances from a mesh", "samples/17_clearance.cpp", "fields", "distances"),
     ("A closed mesh of any triangles", "samples/19_remesh.cpp", "remesh", "surfaces"),
+    ("Colours of its vertices", "samples/20_scan.cpp", "call", "surfaces"),
     ("How much of a voxel is inside", "samples/guide/solids.cpp", "fractions", "cells"),
     ("Connected components", "samples/guide/solids.cpp", "labels", "label"),
     ("Instances", "samples/09_forest.cpp", "instances", "meshes"),

@@ -20,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 SITE = ROOT / "docs" / "site"
 # Document of the repository: page of the site.
 PAGES = {
-    "docs/guide.md": "guide", "docs/tool.md": "tool", "docs/scale.md": "scale", "docs/solvers.md": "solvers", "python/README.md": "python", "docs/gallery/README.md": "gallery/index",
+    "docs/guide.md": "guide", "docs/tool.md": "tool", "docs/scale.md": "scale", "docs/solvers.md": "solvers", "docs/c_api.md": "c_api", "python/README.md": "python", "docs/gallery/README.md": "gallery/index",
     "python/tutorials/volume.md": "tutorials/volume", "python/tutorials/colours.md": "tutorials/colours", "python/tutorials/scan.md": "tutorials/scan",
     "python/tutorials/network.md": "tutorials/network",
     "docs/design.md": "design", "docs/pipeline.md": "pipeline", "docs/performance.md": "performance", "docs/optimizations.md": "optimizations",

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #include "arrays.hpp"
-#include "parts.hpp"
 
-#include <voxelpipe/distance/distance.hpp>
+#include <bindings/nearest.hpp>
+#include <bindings/parts.hpp>
 
 #include <nanobind/stl/optional.h>
 
@@ -13,16 +13,6 @@
 
 namespace voxelpipe::python {
 namespace {
-
-// The distance, and the number of the nearest triangle among all parts; -1 beyond the band.
-struct distance_and_nearest {
-    VOXELPIPE_HD output<float, std::int64_t> operator()(const distance_fragment<>& f) const {
-        return outputs(f.distance, f.in_band ? static_cast<std::int64_t>(f.primitive) : std::int64_t{-1});
-    }
-};
-
-using distances = target<float, blend::replace>;
-using numbers = target<std::int64_t, blend::replace>;
 
 // As voxelpipe/_distance.py has them; band: 0 is "whole". Throws ValueError.
 distance_options options_named(double band, const std::string& sign, const std::string& repair_name,

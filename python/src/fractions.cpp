@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #include "arrays.hpp"
-#include "parts.hpp"
 
+#include <bindings/parts.hpp>
 #include <voxelpipe/cells/cells.hpp>
 
 #include <nanobind/stl/optional.h>

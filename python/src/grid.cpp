@@ -59,6 +59,13 @@ nb::object convert(const conversion& how, const grid& g, const nb::object& what)
     return nb::module_::import_("voxelpipe._axes").attr(how.name)(g, what);
 }
 
+// Three numbers. Raises TypeError with the argument's name and what it is for anything else.
+template <class Triple>
+Triple three_numbers(const nb::object& value, const char* name, const char* what) {
+    if (Triple t; nb::try_cast(value, t)) return t;
+    throw nb::type_error((std::string(name) + " is " + what + ", not " + nb::repr(value).c_str()).c_str());
+}
+
 // A number of voxels along an axis that no grid has is refused by its name.
 void check_resolution(std::int64_t n) {
     if (n < 1 || n > grid::max_extent)
@@ -89,15 +96,21 @@ void bind_grid(nb::module_& m) {
                      "Grids do not change, and compare by value.")
         .def(
             "__init__",
-            [](grid* self, const triple_of_double& origin, const triple_of_double& voxel_size,
-               const triple_of_int& shape) {
-                check_voxel_size(voxel_size);
-                check_shape(shape, "shape");
-                new (self) grid(make_grid(origin, voxel_size, shape));
+            [](grid* self, const nb::object& origin, const nb::object& voxel_size, const nb::object& shape) {
+                const auto low = three_numbers<triple_of_double>(origin, "origin", "three numbers (x, y, z)");
+                const auto size =
+                    three_numbers<triple_of_double>(voxel_size, "voxel_size", "three numbers, along x, y and z");
+                const auto counts = three_numbers<triple_of_int>(shape, "shape", "three whole numbers (nz, ny, nx)");
+                check_voxel_size(size);
+                check_shape(counts, "shape");
+                new (self) grid(make_grid(low, size, counts));
             },
             nb::arg("origin"), nb::arg("voxel_size"), nb::arg("shape"),
+            nb::sig("def __init__(self, origin: collections.abc.Sequence[float], voxel_size: "
+                    "collections.abc.Sequence[float], shape: collections.abc.Sequence[int]) -> None"),
             "origin: world position (x, y, z) of the low corner. voxel_size: world units along x, y and z.\n"
-            "shape: (nz, ny, nx), each from 1 to 2^20. Raises ValueError.")
+            "shape: (nz, ny, nx), each from 1 to 2^20. Raises TypeError for what is not three numbers, ValueError for\n"
+            "numbers that no grid has.")
         .def_prop_ro(
             "origin", [](const grid& g) { return to_tuple(g.part_origin()); },
             "World position (x, y, z) of the low corner.")
@@ -111,23 +124,30 @@ void bind_grid(nb::module_& m) {
             "(z, y, x): the first voxel's index in the grid that this one was cropped from; zeros otherwise.")
         .def(
             "crop",
-            [](const grid& g, const triple_of_int& begin, const triple_of_int& shape) {
-                grid part = checked(g.crop(extent_of(begin), extent_of(shape)));
+            [](const grid& g, const nb::object& begin, const nb::object& shape) {
+                const auto first = three_numbers<triple_of_int>(begin, "begin", "three whole numbers (z, y, x)");
+                const auto counts = three_numbers<triple_of_int>(shape, "shape", "three whole numbers (nz, ny, nx)");
+                grid part = checked(g.crop(extent_of(first), extent_of(counts)));
                 if (part.extent == part.whole) part.whole = glm::ivec3(0); // all of it: equal to the whole
                 return part;
             },
             nb::arg("begin"), nb::arg("shape"),
+            nb::sig(
+                "def crop(self, begin: collections.abc.Sequence[int], shape: collections.abc.Sequence[int]) -> Grid"),
             "The part of `shape` (nz, ny, nx) that begins at voxel `begin` (z, y, x). What is drawn into a crop is, "
             "bit\n"
             "for bit, that part of what is drawn into the whole. Raises ValueError where it is not within the grid.")
         .def(
             "voxel_center",
-            [](const grid& g, const triple_of_int& voxel) {
+            [](const grid& g, const nb::object& voxel) {
+                const auto at = three_numbers<triple_of_int>(voxel, "voxel", "three whole numbers (i, j, k)");
                 return to_tuple(
-                    g.to_world(to_vector({static_cast<double>(voxel[0]) + 0.5, static_cast<double>(voxel[1]) + 0.5,
-                                          static_cast<double>(voxel[2]) + 0.5})));
+                    g.to_world(to_vector({static_cast<double>(at[0]) + 0.5, static_cast<double>(at[1]) + 0.5,
+                                          static_cast<double>(at[2]) + 0.5})));
             },
-            nb::arg("voxel"), "World position of the centre of voxel (i, j, k), counted along x, y and z.")
+            nb::arg("voxel"),
+            nb::sig("def voxel_center(self, voxel: collections.abc.Sequence[int]) -> tuple[float, float, float]"),
+            "World position of the centre of voxel (i, j, k), counted along x, y and z.")
         .def(
             "zyx", [](const grid& g, const nb::object& ijk) { return convert(zyx_call, g, ijk); }, nb::arg("ijk"),
             nb::sig(zyx_call.signature),

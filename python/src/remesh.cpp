@@ -1,13 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #include "arrays.hpp"
-#include "parts.hpp"
 #include "report.hpp"
 
+#include <bindings/parts.hpp>
 #include <voxelpipe/surfaces/remesh.hpp>
 
 #include <nanobind/stl/optional.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -29,6 +30,7 @@ nb::dict report_surface(const status& s) {
     d["cone_crossings"] = s.surface.cone_crossings;
     d["made_crossings"] = s.surface.made_crossings;
     d["nan_samples"] = s.surface.nan_samples;
+    d["nearest_values"] = s.surface.nearest_values;
     return d;
 }
 
@@ -76,12 +78,99 @@ nb::tuple made_surface(const grid& world, unsigned threads, const Make& make) {
     return arrays_of(backend, made, world, s);
 }
 
-// As voxelpipe/_remesh.py has them. Throws ValueError.
+// Rows of values for the vertices and the triangles of a mesh.
+template <class T>
+using value_array = nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+// Values of a call: columns of floats, then of integers; each those of vertices before those of triangles.
+template <class T>
+struct value_columns {
+    const T *of_vertices, *of_triangles;
+    std::size_t num_of_vertices, num_of_triangles;
+
+    value_columns(const value_array<T>& vertices, const value_array<T>& triangles)
+        : of_vertices(vertices.data()), of_triangles(triangles.data()), num_of_vertices(vertices.shape(1)),
+          num_of_triangles(triangles.shape(1)) {}
+    [[nodiscard]] std::size_t count() const { return num_of_vertices + num_of_triangles; }
+};
+
+// Floats in fours, interpolated where they are of vertices; integers of the triangle or its first vertex.
+template <std::size_t Fours, std::size_t Integers>
+struct column_shader {
+    const glm::uvec3* triangles; // of all parts
+    value_columns<float> floats;
+    value_columns<std::int64_t> integers;
+
+    auto operator()(const fragment<>& f) const {
+        return make(f, std::make_index_sequence<Fours>{}, std::make_index_sequence<Integers>{});
+    }
+
+private:
+    template <std::size_t... F, std::size_t... I>
+    auto make(const fragment<>& f, std::index_sequence<F...>, std::index_sequence<I...>) const {
+        return outputs(glm::vec4(at(f, 4 * F), at(f, 4 * F + 1), at(f, 4 * F + 2), at(f, 4 * F + 3))...,
+                       integer(f, I)...);
+    }
+    [[nodiscard]] float at(const fragment<>& f, std::size_t column) const {
+        if (column < floats.num_of_vertices) {
+            const glm::uvec3 t = triangles[f.primitive];
+            const auto of = [&](std::uint32_t v) { return floats.of_vertices[v * floats.num_of_vertices + column]; };
+            return core::member_traits<float>::mix(of(t.x), of(t.y), of(t.z), f.barycentric.y, f.barycentric.z);
+        }
+        column -= floats.num_of_vertices;
+        if (column >= floats.num_of_triangles) return 0.0F;
+        return floats.of_triangles[f.primitive * floats.num_of_triangles + column];
+    }
+    [[nodiscard]] std::int64_t integer(const fragment<>& f, std::size_t column) const {
+        if (column < integers.num_of_vertices)
+            return integers.of_vertices[triangles[f.primitive].x * integers.num_of_vertices + column];
+        column -= integers.num_of_vertices;
+        if (column >= integers.num_of_triangles) return 0;
+        return integers.of_triangles[f.primitive * integers.num_of_triangles + column];
+    }
+};
+
+// Surfaces with the values of column_shader.
+template <class Fours, class Integers>
+struct column_surface;
+template <std::size_t... F, std::size_t... I>
+struct column_surface<std::index_sequence<F...>, std::index_sequence<I...>> {
+    template <class T, std::size_t>
+    using repeated = T;
+    using type = surface<cpu_backend, repeated<glm::vec4, F>..., repeated<std::int64_t, I>...>;
+
+    // (n, columns) of floats, and of integers.
+    static std::pair<nb::object, nb::object> arrays(cpu_backend& backend, const type& made, std::size_t floats,
+                                                    std::size_t integers) {
+        const std::size_t n = made.vertices.size();
+        std::vector<float> rows(n * floats);
+        std::vector<std::int64_t> whole(n * integers);
+        const auto put_four = [&]<std::size_t K>() {
+            const std::vector<glm::vec4> values = get<K>(made).to_host(backend);
+            for (std::size_t v = 0; v < n; ++v)
+                for (std::size_t c = 4 * K; c < std::min(floats, 4 * K + 4); ++c)
+                    rows[v * floats + c] = values[v][static_cast<glm::length_t>(c - 4 * K)];
+        };
+        const auto put_integer = [&]<std::size_t K>() {
+            if (K >= integers) return;
+            const std::vector<std::int64_t> values = get<sizeof...(F) + K>(made).to_host(backend);
+            for (std::size_t v = 0; v < n; ++v) whole[v * integers + K] = values[v];
+        };
+        (put_four.template operator()<F>(), ...);
+        (put_integer.template operator()<I>(), ...);
+        return {to_numpy(std::move(rows), {n, floats}), to_numpy(std::move(whole), {n, integers})};
+    }
+};
+
+// As voxelpipe/_remesh.py has them: at most 16 columns of floats and 4 of integers. The arrays of the surface, then
+// (n, columns) of floats and of integers. Throws ValueError.
 nb::tuple remesh_parts(const position_array& positions, const triangle_array& triangles,
                        const std::vector<std::uint64_t>& first_triangles, const grid& g, const grid& world,
                        const std::string& sign, const std::string& repair_name, const std::string& bodies_name,
                        std::optional<std::uint64_t> max_hole_edges, int closing, const std::string& place_name,
-                       double level, bool quads, std::uint32_t min_component, unsigned threads) {
+                       double level, bool quads, std::uint32_t min_component, const value_array<float>& vertex_floats,
+                       const value_array<float>& triangle_floats, const value_array<std::int64_t>& vertex_integers,
+                       const value_array<std::int64_t>& triangle_integers, unsigned threads) {
     const solid_options solid = solid_options_named(sign, "outer", repair_name, bodies_name, max_hole_edges, closing);
     remesh_options options;
     options.place = place_named(place_name);
@@ -94,10 +183,34 @@ nb::tuple remesh_parts(const position_array& positions, const triangle_array& tr
     options.quads = quads;
     options.min_component = min_component;
     const mesh_view<> mesh = view_of(positions, triangles);
-    return made_surface(world, threads, [&](cpu_backend& backend, surface<cpu_backend>& made) {
-        const auto draws = draws_of_parts<draw<mesh_view<>, passthrough, none>>(mesh, first_triangles, none{});
-        return remesh(backend, draws, g, made, options);
-    });
+    const value_columns<float> floats(vertex_floats, triangle_floats);
+    const value_columns<std::int64_t> integers(vertex_integers, triangle_integers);
+    const auto run = [&]<std::size_t Fours, std::size_t Integers>() -> nb::tuple {
+        using columns = column_surface<std::make_index_sequence<Fours>, std::make_index_sequence<Integers>>;
+        using shader = column_shader<Fours, Integers>;
+        cpu_backend backend{threads};
+        typename columns::type made(backend);
+        status s;
+        {
+            const nb::gil_scoped_release released;
+            const auto draws = draws_of_parts<draw<mesh_view<>, passthrough, shader>>(
+                mesh, first_triangles, shader{mesh.triangles.data(), floats, integers});
+            s = remesh(backend, draws, g, made, options);
+        }
+        const nb::tuple arrays = arrays_of(backend, made, world, s);
+        const auto [rows, whole] = columns::arrays(backend, made, floats.count(), integers.count());
+        return nb::make_tuple(arrays, rows, whole);
+    };
+    if (integers.count() == 0 && floats.count() == 0)
+        return nb::make_tuple(made_surface(world, threads,
+                                           [&](cpu_backend& backend, surface<cpu_backend>& made) {
+                                               const auto draws = draws_of_parts<draw<mesh_view<>, passthrough, none>>(
+                                                   mesh, first_triangles, none{});
+                                               return remesh(backend, draws, g, made, options);
+                                           }),
+                              nb::none(), nb::none());
+    if (integers.count() == 0 && floats.count() <= 4) return run.template operator()<1, 0>();
+    return run.template operator()<4, 4>();
 }
 
 extract_options extract_options_named(const std::string& place_name, double level, bool open, bool quads,
@@ -141,7 +254,8 @@ void bind_remesh(nb::module_& m) {
     m.def("remesh", &remesh_parts, nb::arg("positions"), nb::arg("triangles"), nb::arg("first_triangles"),
           nb::arg("grid"), nb::arg("world"), nb::arg("sign"), nb::arg("repair"), nb::arg("bodies"),
           nb::arg("max_hole_edges").none(), nb::arg("closing"), nb::arg("place"), nb::arg("level"), nb::arg("quads"),
-          nb::arg("min_component"), nb::arg("threads"));
+          nb::arg("min_component"), nb::arg("vertex_floats"), nb::arg("triangle_floats"), nb::arg("vertex_integers"),
+          nb::arg("triangle_integers"), nb::arg("threads"));
     m.def("extract_bits", &extract_bits, nb::arg("values"), nb::arg("grid"), nb::arg("place"), nb::arg("open"),
           nb::arg("quads"), nb::arg("min_component"), nb::arg("threads"));
     m.def("extract_field", &extract_field, nb::arg("values"), nb::arg("grid"), nb::arg("place"), nb::arg("level"),

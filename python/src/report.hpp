@@ -4,6 +4,7 @@
 
 // Shared by the modules for CPU and GPU: names of options, and a failed status as a Python exception.
 
+#include <bindings/parts.hpp>
 #include <voxelpipe/solid/solid.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
@@ -21,6 +22,7 @@
 namespace voxelpipe::python {
 
 namespace nb = nanobind;
+using namespace bindings; // what all bindings share
 
 // "conservative", "thin", "crosshair" or "diagonal". Throws ValueError.
 [[nodiscard]] inline coverage coverage_named(std::string_view name) {

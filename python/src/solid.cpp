@@ -1,19 +1,16 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #include "arrays.hpp"
-#include "parts.hpp"
 #include "sparse.hpp"
 
+#include <bindings/bits.hpp>
+#include <bindings/parts.hpp>
 #include <voxelpipe/solid/diagnose_repair.hpp>
 #include <voxelpipe/solid/solid.hpp>
 
-#include <cpu_ref/parallel.hpp>
-
 #include <nanobind/stl/optional.h>
 
-#include <algorithm>
 #include <optional>
-#include <thread>
 
 namespace voxelpipe::python {
 namespace {
@@ -21,23 +18,6 @@ namespace {
 using bits = target<bit, blend::bit_or>;
 using shader = decltype(constant(true));
 using solid_draw = draw<mesh_view<>, passthrough, shader>;
-
-// A byte for each bit of rows of words.
-void expand(const std::uint32_t* words, std::uint8_t* out, const glm::ivec3& extent, unsigned threads) {
-    const auto nx = static_cast<std::size_t>(extent.x), words_per_row = (nx + 31) / 32;
-    const std::size_t rows = static_cast<std::size_t>(extent.y) * static_cast<std::size_t>(extent.z);
-    constexpr std::size_t block = 64;
-    const unsigned workers = threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
-    cpu::parallel_for(workers, (rows + block - 1) / block, [&](unsigned, std::size_t b) {
-        for (std::size_t row = b * block; row < std::min(rows, (b + 1) * block); ++row)
-            for (std::size_t w = 0; w < words_per_row; ++w) {
-                const std::uint32_t word = words[row * words_per_row + w];
-                std::uint8_t* const to = out + row * nx + 32 * w;
-                const auto n = static_cast<unsigned>(std::min<std::size_t>(32, nx - 32 * w));
-                for (unsigned i = 0; i < n; ++i) to[i] = static_cast<std::uint8_t>(word >> i & 1U);
-            }
-    });
-}
 
 // Part i of the triangles begins with number first_triangles[i]. Either of the results may be none.
 nb::dict solid_dense(const position_array& positions, const triangle_array& triangles,

@@ -5,15 +5,6 @@
 namespace voxelpipe::python {
 namespace {
 
-// Channels of fewer than three columns take the first ones.
-sparse_values<float> first_columns(sparse_values<float>&& drawn, std::size_t columns) {
-    if (columns == 3) return std::move(drawn);
-    for (std::size_t i = 0; i < drawn.num_voxels; ++i)
-        for (std::size_t c = 0; c < columns; ++c) drawn.values[i * columns + c] = drawn.values[3 * i + c];
-    drawn.values.resize(drawn.num_voxels * columns);
-    return std::move(drawn);
-}
-
 // Values of columns [first_column, first_column + num_columns), one row for each voxel; 1 to 3 columns.
 nb::tuple bake_floats(const position_array& positions, const triangle_array& triangles, const grid& g,
                       const std::string& rule, const array<const float, 2>& values, std::size_t first_column,
@@ -22,7 +13,6 @@ nb::tuple bake_floats(const position_array& positions, const triangle_array& tri
     if (num_columns < 1 || num_columns > 3) throw nb::value_error("a pass takes 1 to 3 columns");
     const auto call = make_bake_call<float>(positions, triangles, g, rule, values, {first_column, num_columns},
                                             per_triangle, threads);
-    // A lone column is drawn as one of three where that is rare: a third of the time to compile.
     auto drawn = with_blend(blend_name, [&]<class Blend>() {
         const nb::gil_scoped_release released;
         if constexpr (std::is_same_v<Blend, blend::add>)

@@ -5,24 +5,10 @@
 // Attributes that are baked into voxels by the CPU.
 
 #include "arrays.hpp"
-#include "value_rows.hpp"
 
-#include <cpu_ref/parallel.hpp>
-
-#include <algorithm>
-#include <thread>
+#include <bindings/sparse_values.hpp>
 
 namespace voxelpipe::python {
-
-// A call's mesh, grid and values. The arrays are the caller's.
-template <class T>
-struct bake_call {
-    mesh_view<> mesh;
-    grid where;
-    coverage rule = coverage::conservative;
-    value_rows<T> rows;
-    unsigned threads = 0;
-};
 
 struct column_range {
     std::size_t first = 0, count = 1;
@@ -52,18 +38,6 @@ auto with_blend(std::string_view name, F&& f) {
     if (name == "max") return f.template operator()<blend::max>();
     if (name == "last") return f.template operator()<blend::replace>();
     throw nb::value_error(("blend is 'mean', 'sum', 'min', 'max' or 'last', not '" + std::string(name) + "'").c_str());
-}
-
-// Divides the sums of a mean by the numbers of fragments, each quotient rounded once. `values` has `components` for
-// each of the counts, none of which is 0.
-template <class T>
-void divide(T* values, const std::uint32_t* counts, std::size_t n, std::size_t components, unsigned threads) {
-    constexpr std::size_t block = std::size_t{1} << 16;
-    const unsigned workers = threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
-    cpu::parallel_for(workers, (n + block - 1) / block, [&](unsigned, std::size_t b) {
-        for (std::size_t i = b * block; i < std::min(n, (b + 1) * block); ++i)
-            for (std::size_t c = 0; c < components; ++c) values[i * components + c] /= static_cast<T>(counts[i]);
-    });
 }
 
 } // namespace voxelpipe::python

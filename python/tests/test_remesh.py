@@ -79,3 +79,67 @@ def test_bad_arguments():
         vp.extract(np.zeros((3, 4, 4), bool), grid)
     with pytest.raises(ValueError, match="place"):
         vp.remesh((BOX, FACES), grid, place="middle")
+
+
+def sphere():
+    """A ball of radius 1, and positions of the mesh's vertices."""
+    trimesh = pytest.importorskip("trimesh")
+    ball = trimesh.creation.icosphere(3)
+    return np.asarray(ball.vertices, np.float32), np.asarray(ball.faces)
+
+
+def test_attributes_are_interpolated():
+    positions, faces = sphere()
+    grid = vp.fit((positions, faces), 30)
+    linear = positions @ np.array([[1.0, 2, 3]]).T
+    counts = {}
+    attributes = {"at": positions, "linear": linear[:, 0], "byte": np.full((len(positions), 3), 77, np.uint8)}
+    vertices, triangles, more = vp.remesh((positions, faces), grid, place="mean", attributes=attributes, status=counts)
+    assert counts["nearest_values"] == 0
+    assert more["at"].dtype == np.float32 and more["at"].shape == vertices.shape
+    assert more["linear"].shape == (len(vertices),)
+    # A vertex is the mean of its crossings, rounded to 2^-16 of a cell of 1 / 15.
+    assert np.abs(more["at"] - vertices).max() < 4e-6
+    assert np.abs(more["linear"] - vertices @ [1, 2, 3]).max() < 1e-5
+    assert more["byte"].dtype == np.uint8 and (more["byte"] == 77).all()
+    plain = vp.remesh((positions, faces), grid, place="mean")
+    assert np.array_equal(plain[0], vertices) and np.array_equal(plain[1], triangles)
+    assert np.array_equal(plain[2]["source"], more["source"])
+
+
+def test_materials_are_the_majority_and_many_columns_take_several_runs():
+    positions, faces = sphere()
+    grid = vp.fit((positions, faces), 20)
+    material = (positions[faces].mean(1)[:, 2] > 0).astype(np.int16)
+    wide = np.repeat(positions[:, :1], 35, axis=1)
+    many = np.repeat(material[:, None].astype(np.int64), 6, axis=1) * (1 << 40)
+    vertices, _, more = vp.remesh((positions, faces), grid, attributes={"material": material, "wide": wide, "many": many})
+    assert more["material"].dtype == np.int16
+    sure = np.abs(vertices[:, 2]) > 0.2
+    assert (more["material"][sure] == (vertices[sure, 2] > 0)).all()
+    assert more["wide"].shape == (len(vertices), 35) and (more["wide"] == more["wide"][:, :1]).all()
+    assert np.abs(more["wide"][:, 0] - vertices[:, 0]).max() < 0.1
+    assert more["many"].shape == (len(vertices), 6) and (more["many"] == more["material"][:, None].astype(np.int64) << 40).all()
+
+
+def test_attributes_of_a_level_are_those_of_the_nearest_point():
+    positions, faces = sphere()
+    grid = vp.fit((positions, faces), voxel_size=0.08, padding=4)
+    counts = {}
+    vertices, _, more = vp.remesh((positions, faces), grid, level=0.2, attributes={"at": positions}, status=counts)
+    assert counts["nearest_values"] == len(vertices)
+    between = np.linalg.norm(vertices - more["at"], axis=1)
+    assert np.abs(between - vp.distance_at((positions, faces), vertices.astype(np.float32))).max() < 1e-5
+
+
+def test_bad_attributes():
+    positions, faces = sphere()
+    grid = vp.fit((positions, faces), 8)
+    with pytest.raises(ValueError, match="another name"):
+        vp.remesh((positions, faces), grid, attributes={"cell": positions})
+    with pytest.raises(ValueError, match="rows"):
+        vp.remesh((positions, faces), grid, attributes={"rgb": positions[:5]})
+    with pytest.raises(ValueError, match="as many vertices as triangles"):
+        tetrahedron = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
+        sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+        vp.remesh((tetrahedron, sides), vp.fit((tetrahedron, sides), 8), attributes={"rgb": tetrahedron})

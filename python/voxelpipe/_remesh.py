@@ -2,15 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Mapping
 
 import numpy as np
 
 from . import _core
+from ._bake import _attributes, _Attribute
 from ._core import Grid
 from ._distance import _host_mesh, _warn_of_holes
 from ._surface import take_counts
-from ._types import Bodies, Border, Fill, MeshLike, Place, Repair, check_call, check_choice, real_number, whole_number
+from ._types import Bodies, Border, Fill, MeshLike, Per, Place, Repair, check_call, check_choice, real_number, whole_number
 
 
 def _check_numbers(level: float, min_component: int) -> None:
@@ -21,6 +22,38 @@ def _check_numbers(level: float, min_component: int) -> None:
 def _faces_for(to_caller: Any, faces: np.ndarray) -> Any:
     made = to_caller(faces)
     return made if isinstance(made, np.ndarray) else to_caller(faces.astype(np.int64))
+
+
+_MOST = (16, 4)  # columns of floats and of integers that one run takes
+
+
+def _runs(attributes: list[_Attribute]) -> list[list[tuple[int, int]]]:
+    """(attribute, column) of the columns of each run."""
+    runs: list[list[tuple[int, int]]] = [[]]
+    left = list(_MOST)
+    for i, a in enumerate(attributes):
+        for c in range(a.values.shape[1]):
+            if left[a.is_integer] == 0:
+                runs.append([])
+                left = list(_MOST)
+            left[a.is_integer] -= 1
+            runs[-1].append((i, c))
+    return runs
+
+
+def _columns(m: Any, attributes: list[_Attribute], run: list[tuple[int, int]]) -> tuple[list[np.ndarray], list[tuple[int, int]]]:
+    """What _core.remesh takes: floats of vertices and of triangles, integers of both; and the columns in that order."""
+    arrays, order = [], []
+    for is_integer in (False, True):
+        for per_triangle in (False, True):
+            chosen = [(i, c) for i, c in run if (attributes[i].is_integer, attributes[i].per_triangle) == (is_integer, per_triangle)]
+            rows = len(m.triangles) if per_triangle else len(m.vertices)
+            values = np.empty((rows, len(chosen)), np.int64 if is_integer else np.float32)
+            for k, (i, c) in enumerate(chosen):
+                values[:, k] = attributes[i].values[:, c]
+            arrays.append(values)
+            order += chosen
+    return arrays, order
 
 
 def remesh(
@@ -36,6 +69,8 @@ def remesh(
     level: float = 0.0,
     quads: bool = False,
     min_component: int = 0,
+    attributes: Mapping[str, Any] | None = None,
+    per: Mapping[str, Per] | None = None,
     threads: int = 0,
     status: dict[str, int] | None = None,
 ) -> Any:
@@ -51,18 +86,28 @@ def remesh(
             a closed plate of twice the level.
         quads: (m, 4) in place of (m, 3).
         min_component: components of fewer vertices are left out.
+        attributes: for each name an array with a row for each vertex, which is interpolated (integers are taken from the
+            triangle's first vertex), or for each triangle. A vertex of the result gets the mean of the mesh's floats and
+            uint8 where the mesh crosses the edges of its cell, and the integer that most of these places have, of several
+            the least; where the mesh crosses none, and at a level, the value of the nearest triangle at its closest point.
+            Each 16 columns of floats or 4 of integers beyond the first take another run. Textures of models are none of
+            these: `voxelize --remesh` takes them.
+        per: by name, "vertex" or "triangle", for a mesh that has as many vertices as triangles.
         threads: 0 takes all cores. The result is the same for any number.
         status: a dict that is filled with the call's counters: those of solid(), components, made_crossings (edges that the
-            mesh does not cross, crossed in their middle: 0 for a closed mesh) and cone_crossings among them.
+            mesh does not cross, crossed in their middle: 0 for a closed mesh), cone_crossings and nearest_values (vertices
+            with the attributes of the nearest triangle) among them.
 
     Returns vertices, float64 (n, 3), in world units; faces, uint32 (m, 3), int64 for torch, counter-clockwise seen from
     outside; and a dict with `cell` (n, 3), the index (x, y, z) of the lowest sample of each vertex's cell, `sheet` (n), and
-    `source` (n), a triangle that it comes from, -1 for none. Warns with OpenMeshWarning where rows of samples prove that
+    `source` (n), a triangle that it comes from, -1 for none; and the attributes by name, (n) or (n, columns), of the type
+    that bake() gives. Warns with OpenMeshWarning where rows of samples prove that
     the mesh is not closed. Raises ValueError for a level that is not finite, IndexError for a triangle that names a vertex
     that does not exist, TypeError for a mesh in a GPU's memory.
 
     Example:
         >>> vertices, faces, more = vp.remesh(mesh, grid, repair="close_holes")
+        >>> colored = vp.remesh(mesh, grid, attributes={"rgb": colors})[2]["rgb"]
     """
     check_call("remesh", grid, "conservative", threads, status)
     for what, value, choices in (
@@ -74,29 +119,45 @@ def remesh(
         check_choice(what, value, choices)
     _check_numbers(level, min_component)
     m = _host_mesh(mesh)
+    taken = [name for name in attributes or {} if name in ("cell", "sheet", "source")]
+    if taken:
+        raise ValueError(f"{taken[0]!r} is a result of remesh() by itself; give the attribute another name")
+    given = _attributes(m, attributes or {}, None, per)
     positions, where = m.positions(grid)
-    vertices, faces, cell, sheet, source, counts = _core.remesh(
-        positions,
-        m.triangles,
-        list(m.first_triangles),
-        where,
-        grid,
-        sign,
-        repair,
-        bodies,
-        max_hole_edges,
-        closing,
-        place,
-        float(level),
-        quads,
-        min_component,
-        threads,
-    )
+    columns: dict[tuple[int, int], np.ndarray] = {}
+    made: Any = None
+    for run in _runs(given):
+        arrays, order = _columns(m, given, run)
+        surface, floats, integers = _core.remesh(
+            positions,
+            m.triangles,
+            list(m.first_triangles),
+            where,
+            grid,
+            sign,
+            repair,
+            bodies,
+            max_hole_edges,
+            closing,
+            place,
+            float(level),
+            quads,
+            min_component,
+            *arrays,
+            threads,
+        )
+        made = surface if made is None else made
+        num_floats = arrays[0].shape[1] + arrays[1].shape[1]
+        for k, column in enumerate(order):
+            columns[column] = floats[:, k] if k < num_floats else integers[:, k - num_floats]
+    vertices, faces, cell, sheet, source, counts = made
     take_counts(counts, status)
     _warn_of_holes(counts, f" of {grid.shape[0] * grid.shape[1]} rows of samples", repair)
     if len(source) != len(vertices):
         source = np.full(len(vertices), -1, np.int64)
     more = {"cell": cell, "sheet": sheet, "source": source}
+    for i, a in enumerate(given):
+        more[a.name] = a.typed(m, np.stack([columns[i, c] for c in range(a.values.shape[1])], axis=1))
     return m.to_caller(vertices), _faces_for(m.to_caller, faces), {k: m.to_caller(v) for k, v in more.items()}
 
 

@@ -11,7 +11,11 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <bit>
 #include <cfenv>
+#include <cfloat>
+#include <cmath>
+#include <type_traits>
 
 namespace {
 
@@ -166,6 +170,48 @@ void check_divisions(Int a, Int b) {
     ASSERT_TRUE(floor * b <= a && a - floor * b < b);
     ASSERT_TRUE(ceil * b >= a && ceil * b - a < b);
 }
+
+#if !defined(VOXELPIPE_SOFTWARE_FMA) // where fma is this function, roundings_test.cpp has it against rational numbers
+template <class T>
+void expect_fma(T a, T b, T c) {
+    const T expected = ex::fma(a, b, c), result = ex::software_fma(a, b, c);
+    if (std::isnan(expected) && std::isnan(result)) return;
+    using bits = std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>;
+    ASSERT_EQ(std::bit_cast<bits>(result), std::bit_cast<bits>(expected)) << a << " * " << b << " + " << c;
+}
+
+TEST(SoftwareFma, HasTheBitsOfTheInstruction) {
+    splitmix64 random(11);
+    for (std::int64_t i = unit::cases(300000); i > 0 && !HasFatalFailure(); --i) {
+        double a = std::bit_cast<double>(random.next()), b = std::bit_cast<double>(random.next()),
+               c = std::bit_cast<double>(random.next());
+        const double few = static_cast<double>(random.between(-3, 3));
+        if (i % 4 == 1) c = -a * b * (1 + few * 0x1p-52); // cancels all but some bits
+        if (i % 4 == 2) {                                 // results between 0 and the least normal number
+            a = std::ldexp(unit::spread_double(random, 0, 0), -500);
+            b = unit::spread_double(random, -600, -545);
+            c = unit::spread_double(random, -1100, -1040);
+        }
+        if (i % 4 == 3) { // ties: few bits at any distance
+            a = 1 + few * 0x1p-4;
+            b = std::ldexp(1 + few * 0x1p-51, static_cast<int>(random.between(-60, 60)));
+            c = std::ldexp(few, static_cast<int>(random.between(-60, 60)));
+        }
+        expect_fma(a, b, c);
+        const float x = std::bit_cast<float>(static_cast<std::uint32_t>(random.next())), y = static_cast<float>(b);
+        expect_fma(x, y, i % 2 == 0 ? static_cast<float>(c) : -x * y * (1 + static_cast<float>(few) * 0x1p-23f));
+        expect_fma(static_cast<float>(a), y, static_cast<float>(c));
+    }
+    constexpr double ends[] = {0.0,       -0.0,       1,        -1,       INFINITY,  -INFINITY, NAN,
+                               0x1p-1074, -0x1p-1074, 0x1p-149, 0x1p1023, -0x1p1023, DBL_MAX,   0x1.fffffep127};
+    for (const double a : ends)
+        for (const double b : ends)
+            for (const double c : ends) {
+                expect_fma(a, b, c);
+                expect_fma(static_cast<float>(a), static_cast<float>(b), static_cast<float>(c));
+            }
+}
+#endif
 
 TEST(IntegerDivision, RoundsDownAndUpForBothSigns) {
     for (int a = -40; a <= 40; ++a)

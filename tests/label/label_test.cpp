@@ -9,10 +9,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstdlib>
 #include <random>
+#include <thread>
 #include <vector>
 
 namespace {
@@ -159,6 +161,24 @@ TEST(Label, IsCalledWithTargetsOfFramebuffers) {
     EXPECT_EQ(host(8, 0, 1), 34);
     EXPECT_EQ(host(4, 0, 1), vp::no_label);
     EXPECT_EQ(host(0, 0, 0), vp::no_label);
+}
+
+// Threads that make roots the parents of all numbers leave nothing else, though others follow the same paths meanwhile.
+TEST(Label, ThreadsFlattenSets) {
+    constexpr std::uint32_t numbers = 3000;
+    for (int run = 0; run < 200; ++run) {
+        std::vector<std::uint32_t> parents(numbers);
+        for (std::uint32_t i = 0; i < numbers; ++i) parents[i] = i == 0 ? 0 : i - 1;
+        const vp::core::disjoint_sets<std::uint32_t> sets{parents.data()};
+        const auto flatten = [&](std::uint32_t part) {
+            for (std::uint32_t i = numbers; i-- > 0;)
+                if (i % 4 == part) sets.set_root(i, sets.find(i));
+        };
+        std::vector<std::thread> threads;
+        for (std::uint32_t part = 0; part < 4; ++part) threads.emplace_back(flatten, part);
+        for (std::thread& t : threads) t.join();
+        EXPECT_EQ(std::count(parents.begin(), parents.end(), 0U), std::ptrdiff_t{numbers});
+    }
 }
 
 TEST(Label, BadInputIsRefused) {

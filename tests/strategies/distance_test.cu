@@ -75,6 +75,14 @@ TEST(DeviceDistance, LongListsAndLargeTriangles) {
             expect_same<two_targets>({large}, g, nearest_shader{}, {.band = b, .sign = vp::distance_sign::none});
 }
 
+// Lists so long that many blocks search parts of them.
+TEST(DeviceDistance, ListsOfThousandsOfTriangles) {
+    const glm::ivec3 extent{11, 8, 7};
+    mesh_data m = device_test::translated(device_test::mixed_triangles(5000, 2, 3), {4, 4, 3});
+    append(m, device_test::ball({7, 3, 4}, 2.3f, 20));
+    expect_same<two_targets>({m}, unit_grid(extent), nearest_shader{}, {.sign = vp::distance_sign::none});
+}
+
 TEST(DeviceDistance, MeshesWithoutTriangles) {
     for (const vp::band& b : {vp::band(3.0), vp::band::whole}) {
         expect_same<two_targets>({mesh_data{}}, unit_grid(glm::ivec3(9)), nearest_shader{}, {.band = b});

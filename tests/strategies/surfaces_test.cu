@@ -3,7 +3,7 @@
 
 // Surfaces on the device: the bytes and counters of cpu_backend.
 
-#include "../surfaces/surface_support.hpp"
+#include "../surfaces/value_support.hpp"
 
 #include <cpu_ref/backend.hpp>
 #include <voxelpipe/surfaces/device/surfaces.cuh>
@@ -77,6 +77,23 @@ TEST(DeviceSurfaces, OfBadModelsHaveTheBytesOfTheCpu) {
             expect_same(m, g, {.place = vp::place::corner, .repair = vp::repair::vote});
             expect_same(m, g, {.sample = vp::sample::corner, .bodies = vp::bodies::draw});
             expect_same(m, g, {.level = 0.05});
+        }
+    }
+}
+
+TEST(DeviceSurfaces, ValuesHaveTheBytesOfTheCpu) {
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    for (std::uint32_t seed = 0; seed < 2; ++seed) {
+        const host_mesh m = bad_model(seed);
+        const vp::grid g = grid_around_models(glm::ivec3(18, 21, 19));
+        for (const vp::remesh_options& o :
+             {vp::remesh_options{}, vp::remesh_options{.repair = vp::repair::exterior, .min_component = 9},
+              vp::remesh_options{.repair = vp::repair::close_holes}, vp::remesh_options{.level = 0.05}}) {
+            const host_values a = remesh_with_values(gpu, m, g, o, {1}), b = remesh_with_values(cpu, m, g, o, {1});
+            EXPECT_TRUE(a.mesh.status.ok()) << a.mesh.status.message();
+            EXPECT_GT(a.at.size(), 50u);
+            EXPECT_TRUE(a.has_same_arrays(b));
         }
     }
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // --remesh: closed meshes in every format, where their vertices lie, what is reported, and what is refused.
 #include "../surfaces/mesh_judge.hpp"
+#include "tool_scenes.hpp"
 #include "tool_test.hpp"
 
 #include <gtest/gtest.h>
@@ -11,8 +12,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <map>
+#include <set>
 #include <sstream>
 
 using namespace tool_test;
@@ -37,6 +40,8 @@ void write_crossing_boxes(const std::string& path) {
 
 struct read_surface {
     std::vector<glm::dvec3> vertices;
+    std::vector<glm::vec3> normals;
+    std::vector<glm::ivec3> colors; // sRGB bytes
     std::vector<std::array<std::uint32_t, 3>> faces;
     [[nodiscard]] bool is_closed() const { return surface_tests::judge(faces, vertices.size()).is_closed_manifold(); }
     // Greatest distance of a vertex from the nearest plane of the boxes' faces.
@@ -66,9 +71,16 @@ read_surface read_surface_ply(const std::string& path) {
     };
     read_surface s;
     std::size_t at = bytes.find("end_header\n") + 11;
+    const bool is_colored = bytes.find("property uchar blue\n") < at;
     s.vertices.resize(number_after("element vertex "));
-    for (auto& v : s.vertices)
+    for (auto& v : s.vertices) {
         for (int a = 0; a < 3; ++a, at += 8) v[a] = value_at<double>(bytes, at);
+        glm::vec3& n = s.normals.emplace_back();
+        for (int a = 0; a < 3; ++a, at += 4) n[a] = value_at<float>(bytes, at);
+        if (!is_colored) continue;
+        glm::ivec3& c = s.colors.emplace_back();
+        for (int a = 0; a < 3; ++a, ++at) c[a] = static_cast<std::uint8_t>(bytes[at]);
+    }
     s.faces.resize(number_after("element face "));
     for (auto& f : s.faces) {
         EXPECT_EQ(3, bytes[at++]);
@@ -85,15 +97,25 @@ read_surface read_surface_obj(const std::string& path) {
     std::istringstream text(read_file(path));
     read_surface s;
     for (std::string line; std::getline(text, line);) {
-        std::istringstream words(line.substr(line.empty() ? 0 : 1));
-        if (line[0] == 'v') {
+        std::istringstream words(line);
+        std::string what;
+        words >> what;
+        if (what == "v") {
             auto& v = s.vertices.emplace_back();
             words >> v.x >> v.y >> v.z;
-        } else if (line[0] == 'f') {
+            glm::dvec3 c;
+            if (words >> c.x >> c.y >> c.z)
+                s.colors.emplace_back(std::lround(255 * c.x), std::lround(255 * c.y), std::lround(255 * c.z));
+        } else if (what == "vn") {
+            auto& n = s.normals.emplace_back();
+            words >> n.x >> n.y >> n.z;
+        } else if (what == "f") {
             auto& f = s.faces.emplace_back();
             for (auto& i : f) {
-                words >> i;
-                --i;
+                std::string corner;
+                words >> corner;
+                i = static_cast<std::uint32_t>(std::stoul(corner)) - 1;
+                EXPECT_EQ(std::to_string(i + 1) + "//" + std::to_string(i + 1), corner);
             }
         }
     }
@@ -136,6 +158,30 @@ read_surface read_surface_glb(const std::string& path) {
     for (std::size_t n = 0; n < s.faces.size(); ++n)
         for (std::size_t c = 0; c < 3; ++c)
             s.faces[n][c] = value_at<std::uint32_t>(bytes, bin + 12 * s.vertices.size() + 12 * n + 4 * c);
+    const json& attributes = root["meshes"][0]["primitives"][0]["attributes"];
+    const auto offset_of = [&](const char* name) {
+        const json& accessor = root["accessors"][attributes[name].get<std::size_t>()];
+        EXPECT_EQ(s.vertices.size(), accessor["count"].get<std::size_t>());
+        return bin + root["bufferViews"][accessor["bufferView"].get<std::size_t>()]["byteOffset"].get<std::size_t>();
+    };
+    const std::size_t normals = offset_of("NORMAL");
+    for (std::size_t n = 0; n < s.vertices.size(); ++n)
+        for (int a = 0; a < 3; ++a) {
+            if (a == 0) s.normals.emplace_back();
+            s.normals[n][a] = value_at<float>(bytes, normals + 12 * n + 4 * static_cast<std::size_t>(a));
+        }
+    if (!attributes.contains("COLOR_0")) return s;
+    const std::size_t colors = offset_of("COLOR_0");
+    for (std::size_t n = 0; n < s.vertices.size(); ++n) {
+        glm::ivec3& c = s.colors.emplace_back();
+        for (int a = 0; a < 3; ++a) {
+            const double linear =
+                value_at<std::uint16_t>(bytes, colors + 8 * n + 2 * static_cast<std::size_t>(a)) / 65535.0;
+            c[a] = static_cast<int>(
+                std::lround(255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055)));
+        }
+        EXPECT_EQ(65535, value_at<std::uint16_t>(bytes, colors + 8 * n + 6));
+    }
     return s;
 }
 
@@ -160,6 +206,123 @@ TEST(Remeshing, FilesHoldOneClosedMeshWithItsCreases) {
     EXPECT_EQ(ply.faces, glb.faces);
     EXPECT_EQ(ply.vertices.size(), stl.vertices.size()); // no two at one place
     for (const char* file : {"o.3mf", "o.npz"}) EXPECT_EQ("PK", read_file(folder / file).substr(0, 2));
+}
+
+// A ball with a picture around it, whose colours run smoothly, and a base colour.
+void write_painted_ball(const std::string& path) {
+    builder file;
+    std::vector<float> positions, texcoords;
+    std::vector<std::uint32_t> indices;
+    constexpr std::uint32_t columns = 48, rows = 24;
+    for (std::uint32_t r = 0; r <= rows; ++r)
+        for (std::uint32_t c = 0; c <= columns; ++c) {
+            const double around = 6.283185307179586 * c / columns, down = 3.141592653589793 * r / rows;
+            positions.insert(positions.end(), {static_cast<float>(std::sin(down) * std::cos(around)),
+                                               static_cast<float>(std::sin(down) * std::sin(around)),
+                                               static_cast<float>(std::cos(down))});
+            texcoords.insert(texcoords.end(),
+                             {static_cast<float>(c) / columns, static_cast<float>(r) / static_cast<float>(rows)});
+            const std::uint32_t at = r * (columns + 1) + c, below = at + columns + 1;
+            if (r < rows && c < columns) indices.insert(indices.end(), {at, below, at + 1, at + 1, below, below + 1});
+        }
+    std::vector<std::uint8_t> rgba;
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 64; ++x) {
+            const int wave = 2 * std::abs(x - 32) * 3; // meets itself where the picture does
+            rgba.insert(rgba.end(),
+                        {static_cast<std::uint8_t>(30 + wave), static_cast<std::uint8_t>(40 + 3 * y), 128, 255});
+        }
+    json more;
+    more["pbrMetallicRoughness"]["baseColorFactor"] = {1.0, 0.5, 1.0, 1.0};
+    const int material = add_textured_material(file, 64, 64, rgba, more);
+    const int index_accessor = file.accessor(indices, "SCALAR");
+    json& primitive =
+        file.mesh({{"POSITION", file.accessor(positions, "VEC3")}, {"TEXCOORD_0", file.accessor(texcoords, "VEC2")}});
+    primitive["indices"] = index_accessor;
+    primitive["material"] = material;
+    file.write_glb(path);
+}
+
+// The colours are those of the voxels that the surface touches, where the vertices lie.
+TEST(Remeshing, TexturesBecomeColoursOfVertices) {
+    const scratch_folder folder;
+    write_painted_ball(folder / "m.glb");
+    const outcome result =
+        run(folder, {folder / "m.glb", "--remesh", "-r", "40", "-o", folder / "o.ply", "-o", folder / "o.obj", "-o",
+                     folder / "o.glb", "-o", folder / "o.3mf", "-o", folder / "o.npz", "--compression", "0"});
+    ASSERT_EQ(0, result.code) << result.err;
+    const outcome drawn = run(folder, {folder / "m.glb", "-r", "40", "-t", "color", "-o", folder / "v.npy"});
+    ASSERT_EQ(0, drawn.code) << drawn.err;
+    const array voxels = read_npy(folder / "v.npy");
+    const read_surface ply = read_surface_ply(folder / "o.ply"), obj = read_surface_obj(folder / "o.obj"),
+                       glb = read_surface_glb(folder / "o.glb");
+    EXPECT_TRUE(ply.is_closed());
+    ASSERT_EQ(ply.vertices.size(), ply.colors.size());
+    EXPECT_EQ(ply.colors, obj.colors);
+    ASSERT_EQ(ply.colors.size(), glb.colors.size());
+    for (std::size_t v = 0; v < ply.colors.size(); ++v) // of 16 bits in linear light
+        for (int c = 0; c < 3; ++c) ASSERT_NEAR(ply.colors[v][c], glb.colors[v][c], 1);
+    ASSERT_EQ(std::size_t{40} * 40 * 40, voxels.voxels());
+    const double size = 2.0 * 1.0002 / 40;
+    int seen = 0, least = 255, most = 0;
+    for (std::size_t v = 0; v < ply.vertices.size(); ++v) {
+        std::size_t at = 0;
+        for (int a = 2; a >= 0; --a)
+            at = 40 * at + static_cast<std::size_t>(std::clamp(ply.vertices[v][a] / size + 20, 0.0, 39.0));
+        const auto voxel = [&](std::size_t c) { return voxels.at<std::uint8_t>(4 * at + c); };
+        if (voxel(3) == 0 || std::abs(ply.vertices[v].z) > 0.9) continue; // at the poles the picture is drawn together
+        ++seen;
+        for (int c = 0; c < 3; ++c)
+            ASSERT_NEAR(voxel(static_cast<std::size_t>(c)), ply.colors[v][c], 12) << ply.vertices[v].z;
+        least = std::min(least, ply.colors[v].x);
+        most = std::max(most, ply.colors[v].x);
+    }
+    EXPECT_GT(seen, 2000);
+    EXPECT_LT(least, 50);
+    EXPECT_GT(most, 200);
+    for (std::size_t v = 0; v < ply.vertices.size(); ++v) { // a ball's
+        EXPECT_GT(glm::dot(glm::dvec3(ply.normals[v]), ply.vertices[v]), 0.98);
+        EXPECT_NEAR(1, glm::length(ply.normals[v]), 1e-6);
+        ASSERT_EQ(ply.normals[v], glb.normals[v]);
+        ASSERT_LT(glm::length(ply.normals[v] - obj.normals[v]), 2e-5);
+    }
+    // Every colour once, and three of them a triangle.
+    const std::string text = read_file(folder / "o.3mf");
+    const auto count = [&](const std::string& what) {
+        std::size_t n = 0;
+        for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++n;
+        return n;
+    };
+    std::set<std::array<int, 3>> different;
+    for (const glm::ivec3& c : ply.colors) different.insert({c.x, c.y, c.z});
+    EXPECT_EQ(different.size(), count("<m:color "));
+    EXPECT_EQ(ply.faces.size(), count("pid=\"2\" p1="));
+    const glm::ivec3 first = ply.colors[ply.faces[0][0]];
+    std::array<char, 32> color{};
+    std::snprintf(color.data(), color.size(), "#%02X%02X%02X", static_cast<unsigned>(first.x),
+                  static_cast<unsigned>(first.y), static_cast<unsigned>(first.z));
+    const std::size_t found = text.find(color.data()), triangle = text.find(" p1=\"");
+    ASSERT_NE(std::string::npos, found);
+    const auto number = std::count(text.begin() + static_cast<std::ptrdiff_t>(text.find("<m:colorgroup")),
+                                   text.begin() + static_cast<std::ptrdiff_t>(found), '#');
+    EXPECT_EQ(std::to_string(number), text.substr(triangle + 5, text.find('"', triangle + 5) - triangle - 5));
+}
+
+TEST(Remeshing, ColoursOfMaterialsAndNoColours) {
+    const scratch_folder folder;
+    write_painted_ball(folder / "m.glb");
+    const auto make = [&](const std::string& model, std::vector<std::string> more) {
+        more.insert(more.begin(), {folder / model, "--remesh", "-r", "12", "-o", folder / "o.ply"});
+        const outcome result = run(folder, more);
+        EXPECT_EQ(0, result.code) << result.err;
+        return read_surface_ply(folder / "o.ply");
+    };
+    EXPECT_FALSE(make("m.glb", {}).colors.empty());
+    EXPECT_TRUE(make("m.glb", {"--no-color"}).colors.empty());
+    EXPECT_EQ(make("m.glb", {}).faces, make("m.glb", {"--no-color"}).faces);
+    write_crossing_boxes(folder / "plain.glb");
+    EXPECT_TRUE(make("plain.glb", {"--close-holes"}).colors.empty()); // it has none
+    EXPECT_FALSE(make("m.glb", {"--iso", "0.1", "--padding", "3"}).colors.empty());
 }
 
 TEST(Remeshing, PlacesAndQuads) {

@@ -45,7 +45,13 @@ residence residence_now() noexcept {
 
 // Bytes of malloc's heaps, where the blocks lie that are not counted, and where their memory stays once they are given
 // back.
-std::uint64_t heap_bytes() noexcept { return mallinfo2().arena; }
+std::uint64_t heap_bytes() noexcept {
+#if defined(__GLIBC__) && !__GLIBC_PREREQ(2, 33)
+    return static_cast<unsigned>(mallinfo().arena); // of 32 bits: the heaps' bytes modulo 2^32
+#else
+    return mallinfo2().arena;
+#endif
+}
 
 std::uint64_t difference(std::uint64_t a, std::uint64_t b) { return a > b ? a - b : 0; }
 

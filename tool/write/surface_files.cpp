@@ -25,19 +25,111 @@
 namespace voxelize {
 namespace {
 
-using index_list = std::array<std::uint32_t, 4>; // of a face; its last is not used by triangles
+// Views into the .glb's binary chunk, accessors of them, and the chunk's length.
+struct surface_views {
+    std::string views, accessors;
+    std::uint64_t total = 0;
 
-class surface_writer {
+    // bytes: of a multiple of 4. accessor: what it has besides its view.
+    void add(std::uint64_t bytes, int target, const std::string& accessor) {
+        if (total != 0) views += ',';
+        if (total != 0) accessors += ',';
+        accessors += R"({"bufferView":)" + std::to_string(count_++) + "," + accessor + "}";
+        views += R"({"buffer":0,"byteOffset":)" + std::to_string(total) + R"(,"byteLength":)" + std::to_string(bytes) +
+                 R"(,"target":)" + std::to_string(target) + "}";
+        total += bytes;
+    }
+
+private:
+    int count_ = 0;
+};
+
+// Writes a .glb: colours are linear, as normalised 16-bit integers. Throws write_error where it would pass 4 GiB.
+void write_surface_glb(output_file& out, const surface_shape& shape, const std::filesystem::path& path,
+                       const write_options& options) {
+    const surface_mesh& mesh = shape.mesh();
+    const std::uint64_t vertices = mesh.vertices.size(), triangles = shape.triangles();
+    const auto accessor = [](int type, const char* shape_of_element, std::uint64_t count,
+                             const std::string& more = "") {
+        return R"("componentType":)" + std::to_string(type) + R"(,"type":")" + shape_of_element + R"(","count":)" +
+               std::to_string(count) + more;
+    };
+    const int bits = shape.float_bits();
+    const auto coordinate = [&](std::size_t n, std::size_t a) {
+        return static_cast<float>(shape.rounded(n, a, bits) * mesh.voxel_size[a]);
+    };
+    surface_views views;
+    std::string json = R"({"asset":{"version":"2.0","generator":"voxelize"},"scene":0,"scenes":[{}]})";
+    if (shape.faces() != 0) { // glTF has no empty accessors
+        std::array<float, 3> low{}, high{};
+        for (std::size_t a = 0; a < 3; ++a) low[a] = high[a] = coordinate(0, a);
+        for (std::size_t n = 1; n < vertices; ++n)
+            for (std::size_t a = 0; a < 3; ++a) {
+                low[a] = std::min(low[a], coordinate(n, a));
+                high[a] = std::max(high[a], coordinate(n, a));
+            }
+        const auto list = [](const auto& values) {
+            return "[" + number(static_cast<double>(values[0])) + "," + number(static_cast<double>(values[1])) + "," +
+                   number(static_cast<double>(values[2])) + "]";
+        };
+        constexpr int of_vertices = 34962, of_indices = 34963;
+        views.add(12 * vertices, of_vertices,
+                  accessor(5126, "VEC3", vertices, R"(,"min":)" + list(low) + R"(,"max":)" + list(high)));
+        views.add(12 * triangles, of_indices, accessor(5125, "SCALAR", 3 * triangles));
+        views.add(12 * vertices, of_vertices, accessor(5126, "VEC3", vertices));
+        if (shape.has_colors())
+            views.add(8 * vertices, of_vertices, accessor(5123, "VEC4", vertices, R"(,"normalized":true)"));
+        json = R"({"asset":{"version":"2.0","generator":"voxelize"},"scene":0,"scenes":[{"nodes":[0]}],)"
+               R"("nodes":[{"name":"surface","mesh":0,"translation":)" +
+               list(mesh.origin) + R"(}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":2)" +
+               (shape.has_colors() ? R"(,"COLOR_0":3)" : "") +
+               R"(},"indices":1,"material":0}]}],)"
+               R"("materials":[{"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":1}}],"accessors":[)" +
+               views.accessors + R"(],"bufferViews":[)" + views.views + R"(],"buffers":[{"byteLength":)" +
+               std::to_string(views.total) + "}]}";
+    }
+    if (views.total > std::numeric_limits<std::uint32_t>::max() - 4096)
+        throw write_error(path, "a .glb holds at most 4 GiB; .ply and .npz hold more");
+    json.append((4 - json.size() % 4) % 4, ' ');
+    out.write("glTF");
+    out.write_value<std::uint32_t>(2);
+    out.write_value(static_cast<std::uint32_t>(20 + json.size() + (views.total != 0 ? 8 + views.total : 0)));
+    out.write_value(static_cast<std::uint32_t>(json.size()));
+    out.write("JSON");
+    out.write(json);
+    if (views.total == 0) return;
+    out.write_value(static_cast<std::uint32_t>(views.total));
+    out.write(std::string_view("BIN\0", 4));
+    progress_meter meter(options.progress, (shape.has_colors() ? 3 : 2) * vertices + triangles);
+    write_items(out, vertices, options.threads, meter, [&](std::string& text, std::size_t n) {
+        for (std::size_t a = 0; a < 3; ++a) put(text, coordinate(n, a));
+    });
+    write_items(out, triangles, options.threads, meter, [&](std::string& text, std::size_t n) {
+        for (const std::uint32_t index : shape.triangle(n)) put(text, index);
+    });
+    write_items(out, vertices, options.threads, meter, [&](std::string& text, std::size_t n) {
+        for (glm::length_t a = 0; a < 3; ++a) put(text, mesh.normals[n][a]);
+    });
+    if (!shape.has_colors()) return;
+    write_items(out, vertices, options.threads, meter, [&](std::string& text, std::size_t n) {
+        for (glm::length_t c = 0; c < 3; ++c)
+            put(text, static_cast<std::uint16_t>(std::lround(double{mesh.colors[n][c]} * 65535)));
+        put(text, std::uint16_t{65535});
+    });
+}
+
+class surface_writer : surface_shape {
 public:
     surface_writer(const surface_mesh& mesh, const std::filesystem::path& path, const write_options& options)
-        : mesh_(mesh), path_(path), options_(options), meter_(options.progress, mesh.vertices.size() + faces()) {}
+        : surface_shape(mesh), path_(path), options_(options),
+          meter_(options.progress, mesh.vertices.size() + faces()) {}
 
     std::vector<std::filesystem::path> write() {
         output_file out(path_);
         const std::string extension = lower_extension(path_);
         if (extension == ".ply") write_ply(out);
         if (extension == ".obj") write_obj(out);
-        if (extension == ".glb") write_glb(out);
+        if (extension == ".glb") write_surface_glb(out, *this, path_, options_);
         if (extension == ".stl") write_stl(out);
         if (extension == ".3mf") write_3mf(out);
         if (extension == ".npz") write_npz(out);
@@ -46,57 +138,19 @@ public:
     }
 
 private:
-    [[nodiscard]] std::size_t faces() const { return mesh_.num_faces(); }
-    [[nodiscard]] bool has_quads() const { return !mesh_.quads.empty(); }
-    [[nodiscard]] std::size_t corners() const { return has_quads() ? 4 : 3; }
-    [[nodiscard]] index_list face(std::size_t n) const {
-        if (has_quads()) {
-            const glm::uvec4& q = mesh_.quads[n];
-            return {q.x, q.y, q.z, q.w};
-        }
-        const glm::uvec3& t = mesh_.triangles[n];
-        return {t.x, t.y, t.z, t.z};
-    }
-    // Triangles of all faces: a quad is cut from its first corner.
-    [[nodiscard]] std::size_t triangles() const { return has_quads() ? 2 * faces() : faces(); }
-    [[nodiscard]] std::array<std::uint32_t, 3> triangle(std::size_t n) const {
-        if (!has_quads()) {
-            const index_list f = face(n);
-            return {f[0], f[1], f[2]};
-        }
-        const index_list f = face(n / 2);
-        return {f[0], f[1 + n % 2], f[2 + n % 2]};
-    }
-
-    // Place of a vertex along an axis, in voxels from the grid's low corner.
-    [[nodiscard]] static double place(const voxelpipe::surface_vertex& v, std::size_t axis, std::uint32_t q) {
-        return v.cell[static_cast<glm::length_t>(axis)] + 0.5 + q / 65536.0;
-    }
-    [[nodiscard]] double world(std::size_t vertex, std::size_t axis) const {
-        const voxelpipe::surface_vertex& v = mesh_.vertices[vertex];
-        return std::fma(place(v, axis, v.q[axis]), mesh_.voxel_size[axis], mesh_.origin[axis]);
-    }
-    // Bits of a place in its cell that floats of the grid tell apart.
-    [[nodiscard]] int float_bits() const {
-        int log2 = 0;
-        while ((1 << log2) < *std::max_element(mesh_.extent.begin(), mesh_.extent.end()) + 1) ++log2;
-        return std::clamp(22 - log2, 1, 16);
-    }
-    // The same in that many bits, still within the cell.
-    [[nodiscard]] double rounded(std::size_t vertex, std::size_t axis, int bits) const {
-        const voxelpipe::surface_vertex& v = mesh_.vertices[vertex];
-        const std::uint32_t step = 1U << (16 - bits), half = bits == 16 ? 0 : step / 2;
-        const std::uint32_t q = std::clamp((v.q[axis] + half) / step * step, step, 65536U - step);
-        return place(v, axis, q);
-    }
-
     void write_ply(output_file& out) {
         out.write("ply\nformat binary_little_endian 1.0\ncomment made by voxelize\nelement vertex " +
                   std::to_string(mesh_.vertices.size()) +
-                  "\nproperty double x\nproperty double y\nproperty double z\nelement face " + std::to_string(faces()) +
+                  "\nproperty double x\nproperty double y\nproperty double z\nproperty float nx\nproperty float ny\n"
+                  "property float nz\n" +
+                  (has_colors() ? "property uchar red\nproperty uchar green\nproperty uchar blue\n" : "") +
+                  "element face " + std::to_string(faces()) +
                   "\nproperty list uchar uint vertex_indices\nend_header\n");
         write_items(out, mesh_.vertices.size(), options_.threads, meter_, [&](std::string& text, std::size_t n) {
             for (std::size_t a = 0; a < 3; ++a) put(text, world(n, a));
+            for (glm::length_t a = 0; a < 3; ++a) put(text, mesh_.normals[n][a]);
+            if (has_colors())
+                for (const std::uint8_t c : encoded(n)) put(text, c);
         });
         write_items(out, faces(), options_.threads, meter_, [&](std::string& text, std::size_t n) {
             put(text, static_cast<std::uint8_t>(corners()));
@@ -110,67 +164,23 @@ private:
         write_items(out, mesh_.vertices.size(), options_.threads, meter_, [&](std::string& text, std::size_t n) {
             text += 'v';
             for (std::size_t a = 0; a < 3; ++a) text.append(1, ' ').append(number(world(n, a)));
+            if (has_colors())
+                for (const std::uint8_t c : encoded(n)) text.append(1, ' ').append(fraction_text(c));
+            text += '\n';
+        });
+        write_items(out, mesh_.vertices.size(), options_.threads, meter_, [&](std::string& text, std::size_t n) {
+            text += "vn";
+            for (glm::length_t a = 0; a < 3; ++a) text.append(1, ' ').append(decimal(mesh_.normals[n][a], 5));
             text += '\n';
         });
         write_items(out, faces(), options_.threads, meter_, [&](std::string& text, std::size_t n) {
             text += 'f';
             const index_list f = face(n);
-            for (std::size_t i = 0; i < corners(); ++i)
-                text.append(1, ' ').append(std::to_string(std::uint64_t{f[i]} + 1));
+            for (std::size_t i = 0; i < corners(); ++i) {
+                const std::string at = std::to_string(std::uint64_t{f[i]} + 1);
+                text.append(1, ' ').append(at).append("//").append(at);
+            }
             text += '\n';
-        });
-    }
-
-    void write_glb(output_file& out) {
-        const std::uint64_t positions = 12 * std::uint64_t{mesh_.vertices.size()},
-                            indices = 12 * std::uint64_t{triangles()}, total = positions + indices;
-        if (total > std::numeric_limits<std::uint32_t>::max() - 4096)
-            throw write_error(path_, "a .glb holds at most 4 GiB; .ply and .npz hold more");
-        std::string json = R"({"asset":{"version":"2.0","generator":"voxelize"},"scene":0,"scenes":[{}]})";
-        const int bits = float_bits();
-        const auto coordinate = [&](std::size_t n, std::size_t a) {
-            return static_cast<float>(rounded(n, a, bits) * mesh_.voxel_size[a]);
-        };
-        if (faces() != 0) {
-            std::array<float, 3> low{}, high{};
-            for (std::size_t a = 0; a < 3; ++a) low[a] = high[a] = coordinate(0, a);
-            for (std::size_t n = 1; n < mesh_.vertices.size(); ++n)
-                for (std::size_t a = 0; a < 3; ++a) {
-                    low[a] = std::min(low[a], coordinate(n, a));
-                    high[a] = std::max(high[a], coordinate(n, a));
-                }
-            const auto list = [](const auto& values) {
-                return "[" + number(static_cast<double>(values[0])) + "," + number(static_cast<double>(values[1])) +
-                       "," + number(static_cast<double>(values[2])) + "]";
-            };
-            json = R"({"asset":{"version":"2.0","generator":"voxelize"},"scene":0,"scenes":[{"nodes":[0]}],)"
-                   R"("nodes":[{"name":"surface","mesh":0,"translation":)" +
-                   list(mesh_.origin) +
-                   R"(}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],)"
-                   R"("materials":[{"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":1}}],"accessors":[)"
-                   R"({"bufferView":0,"componentType":5126,"type":"VEC3","count":)" +
-                   std::to_string(mesh_.vertices.size()) + R"(,"min":)" + list(low) + R"(,"max":)" + list(high) +
-                   R"(},{"bufferView":1,"componentType":5125,"type":"SCALAR","count":)" +
-                   std::to_string(3 * triangles()) + R"(}],"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":)" +
-                   std::to_string(positions) + R"(,"target":34962},{"buffer":0,"byteOffset":)" +
-                   std::to_string(positions) + R"(,"byteLength":)" + std::to_string(indices) +
-                   R"(,"target":34963}],"buffers":[{"byteLength":)" + std::to_string(total) + "}]}";
-        }
-        json.append((4 - json.size() % 4) % 4, ' ');
-        out.write("glTF");
-        out.write_value<std::uint32_t>(2);
-        out.write_value(static_cast<std::uint32_t>(20 + json.size() + (faces() != 0 ? 8 + total : 0)));
-        out.write_value(static_cast<std::uint32_t>(json.size()));
-        out.write("JSON");
-        out.write(json);
-        if (faces() == 0) return; // glTF has no empty accessors
-        out.write_value(static_cast<std::uint32_t>(total));
-        out.write(std::string_view("BIN\0", 4));
-        write_items(out, mesh_.vertices.size(), options_.threads, meter_, [&](std::string& text, std::size_t n) {
-            for (std::size_t a = 0; a < 3; ++a) put(text, coordinate(n, a));
-        });
-        write_items(out, triangles(), options_.threads, meter_, [&](std::string& text, std::size_t n) {
-            for (const std::uint32_t index : triangle(n)) put(text, index);
         });
     }
 
@@ -235,7 +245,7 @@ private:
     }
 
     void write_3mf(output_file& out) {
-        constexpr std::uint64_t most_of_line = 128;
+        const std::uint64_t most_of_line = has_colors() ? 256 : 128;
         const bool is_large = (mesh_.vertices.size() + triangles()) * most_of_line > 0xffff'ffffU;
         write_3mf_package(out, options_.compression, is_large, faces() == 0, [&](const entry_sink& add) {
             const auto in_pieces = [&](std::size_t count, const auto& format) {
@@ -249,7 +259,21 @@ private:
                 }
             };
             const auto say = [&](std::string_view text) { add(std::as_bytes(std::span{text})); };
-            say("<object id=\"1\" type=\"model\" name=\"surface\">\n<mesh>\n<vertices>\n");
+            std::vector<std::uint32_t> palette;
+            if (has_colors()) {
+                for (std::size_t n = 0; n < mesh_.vertices.size(); ++n) palette.push_back(encoded_number(n));
+                std::sort(palette.begin(), palette.end());
+                palette.erase(std::unique(palette.begin(), palette.end()), palette.end());
+                say("<m:colorgroup id=\"2\">\n");
+                in_pieces(palette.size(), [&](std::string& text, std::size_t n) { add_3mf_color(text, palette[n]); });
+                say("</m:colorgroup>\n");
+            }
+            const auto color_of = [&](std::uint32_t vertex) {
+                return std::lower_bound(palette.begin(), palette.end(), encoded_number(vertex)) - palette.begin();
+            };
+            say("<object id=\"1\" type=\"model\" name=\"surface\"");
+            say(has_colors() ? " pid=\"2\" pindex=\"0\">\n" : ">\n");
+            say("<mesh>\n<vertices>\n");
             in_pieces(mesh_.vertices.size(), [&](std::string& text, std::size_t n) {
                 text.append("<vertex x=\"").append(number(world(n, 0)));
                 text.append("\" y=\"").append(number(world(n, 1)));
@@ -260,7 +284,13 @@ private:
                 const auto t = triangle(n);
                 text.append("<triangle v1=\"").append(std::to_string(t[0]));
                 text.append("\" v2=\"").append(std::to_string(t[1]));
-                text.append("\" v3=\"").append(std::to_string(t[2])).append("\"/>\n");
+                text.append("\" v3=\"").append(std::to_string(t[2]));
+                if (has_colors()) {
+                    text.append("\" pid=\"2\" p1=\"").append(std::to_string(color_of(t[0])));
+                    text.append("\" p2=\"").append(std::to_string(color_of(t[1])));
+                    text.append("\" p3=\"").append(std::to_string(color_of(t[2])));
+                }
+                text.append("\"/>\n");
             });
             say("</triangles>\n</mesh>\n</object>\n");
         });
@@ -299,10 +329,14 @@ private:
         add_array(archive, "source", scalar::i64, mesh_.sources.size(), 1, [&](std::size_t r, std::size_t) {
             return mesh_.sources[r] == UINT32_MAX ? std::int64_t{-1} : std::int64_t{mesh_.sources[r]};
         });
+        add_array(archive, "normal", scalar::f32, v.size(), 3,
+                  [&](std::size_t r, std::size_t c) { return mesh_.normals[r][static_cast<glm::length_t>(c)]; });
+        if (has_colors())
+            add_array(archive, "color", scalar::u8, v.size(), 3,
+                      [&](std::size_t r, std::size_t c) { return encoded(r)[c]; });
         archive.finish();
     }
 
-    const surface_mesh& mesh_;
     const std::filesystem::path& path_;
     const write_options& options_;
     progress_meter meter_;

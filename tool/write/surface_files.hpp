@@ -10,8 +10,11 @@
 // translation: a warning where its floats merge vertices. It has no indices either, and readers join its vertices by
 // position: where vertices of one cell coincide, each moves by 2^-6 towards the mean of its faces' vertices.
 //
+// Vertices have normals (not in .stl and .3mf), and colours where the mesh has any (not in .stl): linear in .glb, sRGB
+// bytes elsewhere, fractions of 255 in .obj. A .3mf has a colour of the colour group at each corner of a triangle.
+//
 // .npz has the arrays vertices (n, 3), triangles (m, 3) or quads (m, 4), cell (n, 3), sheet (n) and source (n), which
-// is -1 where no triangle of the model made the vertex.
+// is -1 where no triangle of the model made the vertex; normal (n, 3), float32, and color (n, 3), uint8.
 
 #include "formats/formats.hpp"
 #include "model/surface_mesh.hpp"

@@ -31,6 +31,15 @@ struct disjoint_sets {
             v = next;
         }
     }
+    // The same without a change. While threads replace parents by roots, a path must not be halved: a thread that has
+    // read the path before would put an older parent in the place of a root.
+    [[nodiscard]] VOXELPIPE_HD Number find(Number v) const {
+        for (;;) {
+            const Number up = load(parents[v]);
+            if (up == v) return v;
+            v = up;
+        }
+    }
     VOXELPIPE_HD void join(Number a, Number b) const {
         for (;;) {
             a = root(a);
@@ -49,7 +58,7 @@ struct disjoint_sets {
         else
             store(parents[a], b);
     }
-    // Makes a root the parent of v.
+    // Makes a root the parent of v. Other threads may do the same for other numbers, if they call find and not root.
     VOXELPIPE_HD void set_root(Number v, Number root) const { store(parents[v], root); }
 
 private:

@@ -9,6 +9,7 @@
 
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/core/bits.hpp>
+#include <voxelpipe/core/wide_rounding.hpp>
 
 #include <bit>
 #include <cmath>
@@ -18,14 +19,7 @@
 #include <emmintrin.h>
 #endif
 
-namespace voxelpipe {
-
-// Integers of 128 bits, in which coverage of large triangles is decided.
-__extension__ typedef __int128 int128;
-// The same without a sign.
-__extension__ typedef unsigned __int128 uint128;
-
-namespace exact {
+namespace voxelpipe::exact {
 
 // ---- float and double operations, one rounding each -----------------------------------------------------------------
 
@@ -35,6 +29,8 @@ namespace exact {
     float r;
     asm("fma.rn.f32 %0, %1, %2, %3;" : "=f"(r) : "f"(a), "f"(b), "f"(c));
     return r;
+#elif defined(VOXELPIPE_SOFTWARE_FMA)
+    return software_fma(a, b, c);
 #else
     return __builtin_fmaf(a, b, c);
 #endif
@@ -43,6 +39,8 @@ namespace exact {
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE double fma(double a, double b, double c) {
 #if defined(__CUDA_ARCH__)
     return __fma_rn(a, b, c);
+#elif defined(VOXELPIPE_SOFTWARE_FMA)
+    return software_fma(a, b, c);
 #else
     return __builtin_fma(a, b, c);
 #endif
@@ -181,7 +179,7 @@ namespace exact {
     asm("fma.rn.sat.f32 %0, %1, %2, %3;" : "=f"(r) : "f"(a), "f"(b), "f"(c));
     return r;
 #else
-    const float r = __builtin_fmaf(a, b, c);
+    const float r = fma(a, b, c);
     return r > 0.0f ? r < 1.0f ? r : 1.0f : 0.0f;
 #endif
 }
@@ -329,15 +327,6 @@ template <class Int>
     return -floor_div(-a, b);
 }
 
-// Bits that hold a: 0 for 0.
-[[nodiscard]] VOXELPIPE_HD inline int bit_width(std::uint64_t a) {
-#if defined(__CUDA_ARCH__)
-    return 64 - __clzll(static_cast<long long>(a));
-#else
-    return static_cast<int>(std::bit_width(a));
-#endif
-}
-
 // Index of the highest bit set; a != 0. One instruction less than the lowest on a GPU.
 [[nodiscard]] VOXELPIPE_HD inline int highest_one(std::uint32_t a) {
 #if defined(__CUDA_ARCH__)
@@ -372,11 +361,6 @@ template <class Int>
 #endif
 }
 
-[[nodiscard]] VOXELPIPE_HD inline int bit_width(uint128 a) {
-    const auto high = static_cast<std::uint64_t>(a >> 64);
-    return high != 0 ? 64 + bit_width(high) : bit_width(static_cast<std::uint64_t>(a));
-}
-
 // A quotient rounded down, and whether something is left.
 struct wide_quotient {
     uint128 quotient; // rounded down
@@ -395,39 +379,6 @@ struct wide_quotient {
     return {static_cast<uint128>(top) << 64 | middle_quotient << 32 | low_quotient, low_quotient * b != rest};
 }
 
-// Nearest integer multiple of 2^shift, in units of 2^shift, ties to even. 0 <= shift < 128.
-[[nodiscard]] VOXELPIPE_HD inline uint128 shift_right_rne(uint128 a, int shift) {
-    if (shift == 0) return a;
-    const uint128 quotient = a >> shift;
-    const uint128 rest = a & ((uint128{1} << shift) - 1);
-    const uint128 half = uint128{1} << (shift - 1);
-    return quotient + static_cast<uint128>(rest > half || (rest == half && (quotient & 1) != 0));
-}
-
-// magnitude * 2^exponent, rounded once (to nearest, ties to even) to a float with `mantissa_bits` stored mantissa bits
-// and `exponent_bits` exponent bits. Returns the bit pattern without sign. Overflow gives infinity, underflow is
-// gradual. 16-bit: (10, 5), float: (23, 8), double: (52, 11).
-[[nodiscard]] VOXELPIPE_HD inline std::uint64_t round_to_binary(uint128 magnitude, int exponent, int mantissa_bits,
-                                                                int exponent_bits) {
-    if (magnitude == 0) return 0;
-    const int bias = (1 << (exponent_bits - 1)) - 1;
-    const int width = bit_width(magnitude);
-    // The value is 1.xxx * 2^e; below the normal range the last place is fixed at 2^(1 - bias - mantissa_bits).
-    const int e = width - 1 + exponent;
-    const int last_place = (e > 1 - bias ? e : 1 - bias) - mantissa_bits;
-    const int shift = last_place - exponent;
-    uint128 mantissa = 0;
-    if (shift <= 0)
-        mantissa = magnitude << -shift;
-    else if (shift < 128)
-        mantissa = shift_right_rne(magnitude, shift);
-    // A mantissa with its top bit set adds 1 to the exponent; so does a carry out of the rounding.
-    const std::uint64_t biased = e > 1 - bias ? static_cast<std::uint64_t>(e + bias - 1) : 0;
-    const std::uint64_t bits = (biased << mantissa_bits) + static_cast<std::uint64_t>(mantissa);
-    const std::uint64_t infinity = ((std::uint64_t{1} << exponent_bits) - 1) << mantissa_bits;
-    return bits < infinity ? bits : infinity;
-}
-
 // Nearest double, ties to even, of a wide integer. Compilers and devices differ in how they convert __int128.
 [[nodiscard]] VOXELPIPE_HD inline double to_double(int128 a) {
     const bool negative = a < 0;
@@ -440,5 +391,4 @@ struct wide_quotient {
 // Nearest float, ties to even, by one rounding.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float to_float(std::int64_t a) { return static_cast<float>(a); }
 
-} // namespace exact
-} // namespace voxelpipe
+} // namespace voxelpipe::exact

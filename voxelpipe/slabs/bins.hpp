@@ -4,10 +4,9 @@
 
 // Triangles on their way to slabs. A record is a triangle by itself: positions and varyings as the vertex shader gave
 // them, and its number in the whole mesh. A bin is a list of records that only grows; beyond a budget its records go to
-// a temporary file, on threads of their own, while more records come. Needs POSIX files.
+// a temporary file, on threads of their own, while more records come.
 
-#include <fcntl.h>
-#include <unistd.h>
+#include <voxelpipe/slabs/temporary_file.hpp>
 
 #include <algorithm>
 #include <atomic>
@@ -36,15 +35,7 @@ namespace voxelpipe::slabs {
 class scratch_file {
 public:
     // A new, empty file in a folder that is there.
-    explicit scratch_file(const std::string& folder) {
-        std::string name = folder + "/voxelpipe-XXXXXX";
-        file_ = ::mkstemp(name.data());
-        if (file_ < 0) fail(errno, "cannot make a temporary file in " + folder);
-        (void)::unlink(name.c_str());
-    }
-    scratch_file(const scratch_file&) = delete;
-    scratch_file& operator=(const scratch_file&) = delete;
-    ~scratch_file() { ::close(file_); }
+    explicit scratch_file(const std::string& folder) : file_(folder) {}
 
     // Room for bytes at the end, for one write(); returns where. By one thread at a time.
     [[nodiscard]] std::uint64_t extend(std::uint64_t bytes) {
@@ -57,7 +48,7 @@ public:
         for (const auto& part : parts) {
             auto bytes = std::as_bytes(std::span<const typename Parts::value_type::value_type>(part));
             while (!bytes.empty()) {
-                const ssize_t n = ::pwrite(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+                const std::int64_t n = file_.write_some(bytes.data(), bytes.size(), offset);
                 if (n < 0 && errno == EINTR) continue;
                 if (n <= 0) error_ = n < 0 && errno != 0 ? errno : EIO;
                 if (n <= 0) break;
@@ -73,23 +64,20 @@ public:
         for (int n = coming_.load(); n != 0; n = coming_.load()) coming_.wait(n);
         check();
         while (!bytes.empty()) {
-            const ssize_t n = ::pread(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+            const std::int64_t n = file_.read_some(bytes.data(), bytes.size(), offset);
             if (n < 0 && errno == EINTR) continue;
-            if (n <= 0) fail(n < 0 ? errno : EIO, "cannot read a temporary file");
+            if (n <= 0) fail_temporary_file(n < 0 ? errno : EIO, "cannot read a temporary file");
             offset += static_cast<std::uint64_t>(n);
             bytes = bytes.subspan(static_cast<std::size_t>(n));
         }
     }
     // Throws what went wrong with writing so far.
     void check() const {
-        if (const int e = error_.load(); e != 0) fail(e, "cannot write a temporary file");
+        if (const int e = error_.load(); e != 0) fail_temporary_file(e, "cannot write a temporary file");
     }
 
 private:
-    [[noreturn]] static void fail(int error, const std::string& what) {
-        throw std::system_error(error, std::generic_category(), "voxelpipe::slabs: " + what);
-    }
-    int file_ = -1;
+    temporary_file file_;
     std::uint64_t size_ = 0;
     std::atomic<int> coming_ = 0; // writes that have room and have not ended
     std::atomic<int> error_ = 0;  // of a write

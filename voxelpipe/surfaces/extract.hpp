@@ -19,9 +19,10 @@ namespace voxelpipe {
 // grid whose voxels' centres the samples are (grid::at_corners() where they are corners). The surface replaces what
 // `out` holds. Fills status::surface; `from` without anything inside gives an empty surface, which is ok. Bits take no
 // level. Returns after the work is done. A call that fails leaves `out` as it is.
-template <class Backend, class T, class Blend, class Layout>
+template <class Backend, class T, class Blend, class Layout, class... Values>
 [[nodiscard]] status extract(Backend& backend, const target_view<target<T, Blend, Layout>>& from, const grid& samples,
-                             surface<Backend>& out, const extract_options& options = {}) {
+                             surface<Backend, Values...>& out, const extract_options& options = {}) {
+    static_assert(sizeof...(Values) == 0, "voxelpipe: a surface that extract makes has no values");
     constexpr bool is_bit = std::is_same_v<T, bit>;
     static_assert(is_bit || std::is_same_v<T, float>, "voxelpipe: a surface is made of a target of bit or float");
     if (const status s = validate(samples); !s.ok()) return s;
@@ -47,7 +48,7 @@ template <class Backend, class T, class Blend, class Layout>
         if (cells.are_too_many()) return core::too_many_vertices(cells.num_vertices());
         status result;
         if constexpr (is_bit) {
-            return core::finish_surface(backend, cells, samples, nullptr, false, options, out, result);
+            return core::finish_surface(backend, cells, samples, nullptr, nullptr, options, out, result);
         } else {
             typename Backend::template buffer<core::edge_crossing> crossings(backend, cells.num_edges());
             backend.for_each(cells.count(),
@@ -56,15 +57,15 @@ template <class Backend, class T, class Blend, class Layout>
             const std::vector<std::uint64_t> host = counts.to_host(backend);
             result.surface.nan_samples = host[0];
             result.surface.made_crossings = host[1];
-            return core::finish_surface(backend, cells, samples, crossings.data(), false, options, out, result);
+            return core::finish_surface(backend, cells, samples, crossings.data(), nullptr, options, out, result);
         }
     });
 }
 
 // The first target of a framebuffer.
-template <class Backend, class Target, class... Others>
+template <class Backend, class Target, class... Others, class... Values>
 [[nodiscard]] status extract(Backend& backend, const framebuffer<Backend, Target, Others...>& from, const grid& samples,
-                             surface<Backend>& out, const extract_options& options = {}) {
+                             surface<Backend, Values...>& out, const extract_options& options = {}) {
     return extract(backend, get<0>(from.view().targets), samples, out, options);
 }
 

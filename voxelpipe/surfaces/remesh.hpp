@@ -10,12 +10,15 @@
 #include <voxelpipe/solid/solid.hpp>
 #include <voxelpipe/surfaces/extract.hpp>
 #include <voxelpipe/surfaces/passes/gather_mesh.hpp>
+#include <voxelpipe/surfaces/passes/vertex_values.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace voxelpipe {
@@ -117,11 +120,12 @@ void find_mesh_crossings(Backend& backend, const surface_cells<Backend>& cells, 
                                               samples.fraction(), crossings, counts});
 }
 
-// Level 0: the sign of the samples, then the crossings of the mesh itself.
-template <class Backend, class Mesh, class VertexShader>
-[[nodiscard]] status remesh_exactly(Backend& backend,
-                                    std::span<const draw<Mesh, VertexShader, constant_output<bool>>> draws,
-                                    const grid& samples, const remesh_options& options, surface<Backend>& out) {
+// Level 0: the sign of the samples, then the crossings of the mesh itself, then shade(mesh, cells, crossings,
+// counters), whose status counts where it is not ok.
+template <class Backend, class Mesh, class VertexShader, class Shade>
+[[nodiscard]] status
+remesh_exactly(Backend& backend, std::span<const draw<Mesh, VertexShader, constant_output<bool>>> draws,
+               const grid& samples, const remesh_options& options, surface<Backend>& out, const Shade& shade) {
     solid_options sign = sign_options(options);
     std::vector<hole_cones> cones;
     framebuffer<Backend, target<bit, blend::replace>> inside(backend, samples.extent);
@@ -129,28 +133,35 @@ template <class Backend, class Mesh, class VertexShader>
     if (!result.ok()) return result;
     const surface_cells<Backend> cells(backend, get<0>(inside.view().targets).elements, samples.extent);
     if (cells.are_too_many()) return too_many_vertices(cells.num_vertices());
-    if (options.repair == repair::close_holes && result.counts.triangles_in != 0)
+    if (cells.count() == 0) {
+        out = surface<Backend>(backend);
+        out.samples = samples;
+        return result;
+    }
+    if (options.repair == repair::close_holes)
         cones = run_module(find_holes_tag{}, backend, draws, samples, options.bodies, options.max_hole_edges);
     typename Backend::template buffer<edge_crossing> crossings(backend, cells.num_edges());
-    if (cells.count() != 0) {
-        typename Backend::template buffer<std::uint64_t> counts(backend,
-                                                                static_cast<std::size_t>(passes::edge_count::count));
-        backend.for_each(counts.size(), passes::clear_counts{counts.data()});
-        const gathered_mesh<Backend> mesh(backend, draws, samples, cones, options.bodies);
-        find_mesh_crossings<0>(backend, cells, mesh, samples, options, crossings.data(), counts.data());
-        find_mesh_crossings<1>(backend, cells, mesh, samples, options, crossings.data(), counts.data());
-        find_mesh_crossings<2>(backend, cells, mesh, samples, options, crossings.data(), counts.data());
-        const std::vector<std::uint64_t> host = counts.to_host(backend);
-        result.surface.cone_crossings = host[static_cast<std::size_t>(passes::edge_count::on_cones)];
-        result.surface.made_crossings = host[static_cast<std::size_t>(passes::edge_count::made)];
-    }
-    return finish_surface(backend, cells, samples, crossings.data(), true, extract_options_of(options), out, result);
+    typename Backend::template buffer<std::uint64_t> counts(backend,
+                                                            static_cast<std::size_t>(passes::edge_count::count));
+    backend.for_each(counts.size(), passes::clear_counts{counts.data()});
+    const gathered_mesh<Backend> mesh(backend, draws, samples, cones, options.bodies);
+    find_mesh_crossings<0>(backend, cells, mesh, samples, options, crossings.data(), counts.data());
+    find_mesh_crossings<1>(backend, cells, mesh, samples, options, crossings.data(), counts.data());
+    find_mesh_crossings<2>(backend, cells, mesh, samples, options, crossings.data(), counts.data());
+    const std::vector<std::uint64_t> host = counts.to_host(backend);
+    result.surface.cone_crossings = host[static_cast<std::size_t>(passes::edge_count::on_cones)];
+    result.surface.made_crossings = host[static_cast<std::size_t>(passes::edge_count::made)];
+    result = finish_surface(backend, cells, samples, crossings.data(), mesh.view().primitives,
+                            extract_options_of(options), out, result);
+    const status shaded = shade(mesh.view(), &cells, crossings.data(), result.surface);
+    return shaded.ok() ? result : shaded;
 }
 
 // Another level: of the distance.
-template <class Backend, class Mesh, class VertexShader>
+template <class Backend, class Mesh, class VertexShader, class Shade>
 [[nodiscard]] status remesh_level(Backend& backend, std::span<const draw<Mesh, VertexShader, distance>> draws,
-                                  const grid& g, const remesh_options& options, surface<Backend>& out) {
+                                  const grid& g, const remesh_options& options, surface<Backend>& out,
+                                  const Shade& shade) {
     const grid samples = sample_grid(g, options.sample);
     framebuffer<Backend, target<float, blend::replace>> field(backend, samples.extent);
     const status drawn = voxelize_distance(backend, draws, g, field, level_options(options, g));
@@ -161,39 +172,97 @@ template <class Backend, class Mesh, class VertexShader>
         return drawn;
     }
     status result = extract(backend, field, samples, out, extract_options_of(options));
+    if (!result.ok()) return result;
     result.counts = drawn.counts;
     result.solid = drawn.solid;
     result.distance = drawn.distance;
+    if constexpr (Shade::has_values) {
+        const gathered_mesh<Backend> mesh(backend, draws, samples, {}, options.bodies);
+        const status shaded = shade(mesh.view(), nullptr, nullptr, result.surface);
+        if (!shaded.ok()) return shaded;
+    }
     return result;
+}
+
+// Makes the values of a surface; without any it does nothing.
+template <class Backend, class Mesh, class VertexShader, class Shader, class... Values>
+struct surface_shading {
+    static constexpr bool has_values = sizeof...(Values) != 0;
+    Backend& backend;
+    std::span<const draw<Mesh, VertexShader, Shader>> draws;
+    const grid& where;
+    double level;
+    surface<Backend, Values...>& made;
+
+    status operator()(const passes::mesh_triangles& triangles, const surface_cells<Backend>* cells,
+                      const edge_crossing* crossings, surface_counters& counts) const {
+        if constexpr (has_values)
+            return shade_surface(backend, draws, where, triangles, cells, crossings, level, made, counts);
+        else
+            return {};
+    }
+};
+
+// True where the shaders go with the mesh, and make values of these types.
+template <class Mesh, class VertexShader, class Shader, class... Values>
+[[nodiscard]] constexpr bool makes_values() {
+    if constexpr (sizeof...(Values) == 0) {
+        return check_vertex_shader<Mesh, VertexShader>();
+    } else {
+        constexpr bool allowed = (vertex_value<Values>::allowed && ...);
+        static_assert(allowed, "voxelpipe: values of a surface's vertices are float, glm::vec2 to vec4, or integers");
+        if constexpr (allowed && check_shaders<Mesh, VertexShader, Shader>()) {
+            constexpr bool fits = std::is_same_v<shader_output<Mesh, VertexShader, Shader>, output<Values...>>;
+            static_assert(fits, "voxelpipe: the fragment shader must return vp::outputs(...) of the types of the "
+                                "surface's values, in their order");
+            return fits;
+        } else {
+            return false;
+        }
+    }
 }
 
 } // namespace core
 
 // Makes a closed manifold mesh around what lies inside of the draws' triangles: sign, then crossings, then sheets, then
 // mesh. The triangles may be open, cross each other, face any way; options say what is inside and what repairs holes.
-// Draws share one type of mesh and vertex shader; draw::fragment_shader is ignored. The surface replaces what `out`
-// holds; out.samples is the grid of the samples, with which vp::position places vertices. Fills status::surface, and
-// counts and solid as voxelize_solid. Nothing inside gives an empty surface, which is ok. Closed meshes within the grid
-// have no made_crossings. Returns after the work is done. A call that fails leaves `out` as it is.
-template <class Backend, class Mesh, class VertexShader, class Shader>
+// Draws share one type of mesh, vertex shader and fragment shader. The surface replaces what `out` holds; out.samples
+// is the grid of the samples, with which vp::position places vertices. Fills status::surface, and counts and solid as
+// voxelize_solid. Nothing inside gives an empty surface, which is ok. Closed meshes within the grid have no
+// made_crossings. Returns after the work is done. A call that fails leaves `out` as it is.
+//
+// With values in the surface, draw::fragment_shader makes them; without, it is ignored. Its fragment is that of a
+// crossing: `barycentric` is exact there, `voxel` the lower sample of the crossed edge, and `normal` looks outward.
+// Each crossing is shaded once, and a vertex has the mean of its crossings' floats, and the integer that most of them
+// have, of several the least. Crossings without a triangle, or that the shader discards, do not count. A vertex without
+// any that counts, and at a level every vertex, has the values of the nearest triangle of all draws at its closest
+// point, with the vertex's cell as `voxel` (surface_counters::nearest_values); zeros where the shader discards that.
+template <class Backend, class Mesh, class VertexShader, class Shader, class... Values>
 [[nodiscard]] status remesh(Backend& backend, std::span<const draw<Mesh, VertexShader, Shader>> draws, const grid& g,
-                            surface<Backend>& out, const remesh_options& options = {}) {
-    if constexpr (core::check_vertex_shader<Mesh, VertexShader>()) {
+                            surface<Backend, Values...>& out, const remesh_options& options = {}) {
+    if constexpr (core::makes_values<Mesh, VertexShader, Shader, Values...>()) {
         if (const status s = validate(g); !s.ok()) return s;
         if (const status s = core::validate(options, g); !s.ok()) return s;
         if (const status s = core::validate_draws(draws); !s.ok()) return s;
         return backend.guard([&]() -> status {
+            surface<Backend, Values...> made(backend);
+            const core::surface_shading<Backend, Mesh, VertexShader, Shader, Values...> shade{backend, draws, g,
+                                                                                              options.level, made};
+            status result;
             if (options.level != 0.0) {
                 std::vector<draw<Mesh, VertexShader, distance>> measured;
                 for (const auto& d : draws) measured.push_back({d.mesh, d.vertex_shader, {}});
-                return core::remesh_level(backend, std::span<const draw<Mesh, VertexShader, distance>>(measured), g,
-                                          options, out);
+                result = core::remesh_level(backend, std::span<const draw<Mesh, VertexShader, distance>>(measured), g,
+                                            options, made, shade);
+            } else {
+                std::vector<draw<Mesh, VertexShader, constant_output<bool>>> filled;
+                for (const auto& d : draws) filled.push_back({d.mesh, d.vertex_shader, constant(true)});
+                result = core::remesh_exactly(backend,
+                                              std::span<const draw<Mesh, VertexShader, constant_output<bool>>>(filled),
+                                              core::sample_grid(g, options.sample), options, made, shade);
             }
-            std::vector<draw<Mesh, VertexShader, constant_output<bool>>> filled;
-            for (const auto& d : draws) filled.push_back({d.mesh, d.vertex_shader, constant(true)});
-            return core::remesh_exactly(backend,
-                                        std::span<const draw<Mesh, VertexShader, constant_output<bool>>>(filled),
-                                        core::sample_grid(g, options.sample), options, out);
+            if (result.ok()) out = std::move(made);
+            return result;
         });
     } else {
         return {}; // does not compile: a static_assert has said why
@@ -201,24 +270,41 @@ template <class Backend, class Mesh, class VertexShader, class Shader>
 }
 
 // One mesh.
-template <class Backend, class... Attributes, class VertexShader>
+template <class Backend, class... Attributes, class VertexShader, class... Values>
 [[nodiscard]] status remesh(Backend& backend, const mesh_view<Attributes...>& mesh, const grid& g,
-                            const VertexShader& vertex_shader, surface<Backend>& out,
+                            const VertexShader& vertex_shader, surface<Backend, Values...>& out,
                             const remesh_options& options = {}) {
+    static_assert(sizeof...(Values) == 0, "voxelpipe: a surface with values needs a fragment shader");
     using draw_type = draw<mesh_view<Attributes...>, VertexShader, none>;
     const draw_type d{mesh, vertex_shader, {}};
     return remesh(backend, std::span<const draw_type>(&d, 1), g, out, options);
 }
-template <class Backend, class... Attributes, class VertexShader>
+template <class Backend, class... Attributes, class VertexShader, class... Values>
 [[nodiscard]] status remesh(Backend& backend, const mesh<Backend, Attributes...>& m, const grid& g,
-                            const VertexShader& vertex_shader, surface<Backend>& out,
+                            const VertexShader& vertex_shader, surface<Backend, Values...>& out,
                             const remesh_options& options = {}) {
     return remesh(backend, m.view(), g, vertex_shader, out, options);
 }
 
+// One mesh, with values of the vertices.
+template <class Backend, class... Attributes, class VertexShader, class FragmentShader, class... Values>
+[[nodiscard]] status remesh(Backend& backend, const mesh_view<Attributes...>& mesh, const grid& g,
+                            const VertexShader& vertex_shader, const FragmentShader& fragment_shader,
+                            surface<Backend, Values...>& out, const remesh_options& options = {}) {
+    using draw_type = draw<mesh_view<Attributes...>, VertexShader, FragmentShader>;
+    const draw_type d{mesh, vertex_shader, fragment_shader};
+    return remesh(backend, std::span<const draw_type>(&d, 1), g, out, options);
+}
+template <class Backend, class... Attributes, class VertexShader, class FragmentShader, class... Values>
+[[nodiscard]] status remesh(Backend& backend, const mesh<Backend, Attributes...>& m, const grid& g,
+                            const VertexShader& vertex_shader, const FragmentShader& fragment_shader,
+                            surface<Backend, Values...>& out, const remesh_options& options = {}) {
+    return remesh(backend, m.view(), g, vertex_shader, fragment_shader, out, options);
+}
+
 // Draws in any contiguous range, such as a std::vector.
-template <class Backend, core::draw_range Draws>
-[[nodiscard]] status remesh(Backend& backend, const Draws& draws, const grid& g, surface<Backend>& out,
+template <class Backend, core::draw_range Draws, class... Values>
+[[nodiscard]] status remesh(Backend& backend, const Draws& draws, const grid& g, surface<Backend, Values...>& out,
                             const remesh_options& options = {}) {
     return remesh(backend, std::span<const core::draw_of<Draws>>(std::data(draws), std::size(draws)), g, out, options);
 }

@@ -13,6 +13,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+#include <cstddef>
 #include <cstdint>
 
 namespace voxelpipe {
@@ -55,11 +56,17 @@ struct surface_vertex {
         {v.cell.x + 0.5 + v.q[0] * unit, v.cell.y + 0.5 + v.q[1] * unit, v.cell.z + 0.5 + v.q[2] * unit});
 }
 
+// surface<Backend> is a mesh; surface<Backend, Values...> has one value of each type a vertex besides, which remesh
+// gets from fragment shaders: floats and glm::vec2 to vec4, which are means, and integers, of which the majority
+// counts.
+template <class Backend, class... Values>
+struct surface;
+
 // A surface, in a backend's memory. Indices are counter-clockwise seen from outside. Vertices are ordered by cell (z,
 // then y, then x), then sheet; faces by the lower sample of the edge that they cross, then its axis. The first index of
 // a quad is that of its lowest cell; triangles 2 i and 2 i + 1 are quad i.
 template <class Backend>
-struct surface {
+struct surface<Backend> {
     // Memory of the backend.
     template <class T>
     using buffer = typename Backend::template buffer<T>;
@@ -74,6 +81,24 @@ struct surface {
     explicit surface(Backend& backend)
         : vertices(backend, 0), triangles(backend, 0), quads(backend, 0), sources(backend, 0) {}
 };
+
+// The same with values of its vertices, one array for each result of the fragment shaders: get<I>(surface).
+template <class Backend, class First, class... Others>
+struct surface<Backend, First, Others...> : surface<Backend> {
+    core::pack<typename Backend::template buffer<First>, typename Backend::template buffer<Others>...> values;
+
+    // Empty.
+    explicit surface(Backend& backend)
+        : surface<Backend>(backend), values{core::make_pack(typename Backend::template buffer<First>(backend, 0),
+                                                            typename Backend::template buffer<Others>(backend, 0)...)} {
+    }
+};
+
+// Values I of the vertices, in their order.
+template <std::size_t I, class Backend, class First, class... Others>
+[[nodiscard]] const auto& get(const surface<Backend, First, Others...>& s) {
+    return get<I>(s.values);
+}
 
 namespace core {
 

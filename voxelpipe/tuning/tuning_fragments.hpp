@@ -26,16 +26,13 @@ inline constexpr int max_digit_bits = 10; // 30 bits of a voxel of 1024^3 are th
 inline constexpr int digit_count_threads = 1024;
 [[nodiscard]] constexpr int sort_blocks(int items) { return items == few_sort_items ? 3 : 2; } // per multiprocessor
 
-// ---- key sort and prefix sums (device/scene/) -----------------------------------------------------------------------
+// ---- key sort and selection (device/scene/) -----------------------------------------------------------------------
 
 inline constexpr int key_sort_threads = 512; // of a block, which sorts a tile
-inline constexpr int key_sort_items = 8;     // pairs per thread: 32 KB of shared memory for keys of 64 bits
+inline constexpr int key_sort_items = 8;     // pairs per thread: 16 KB of shared memory
 inline constexpr int max_key_digit_bits = 9; // one digit per thread; 18 bits of a tile's number are two passes
-[[nodiscard]] constexpr int key_sort_blocks(std::size_t key_bytes) {
-    return key_bytes == 4 ? 3 : 2;
-} // per multiprocessor
-inline constexpr int prefix_sum_items = 4; // counts per thread
-inline constexpr int selection_items = 8;  // elements per thread
+inline constexpr int key_sort_blocks = 3;    // per multiprocessor
+inline constexpr int selection_items = 8;    // elements per thread
 
 // ---- counting sort (device/fragments/counting_sort.cuh) -------------------------------------------------------------
 

@@ -2,12 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "../../src/value_rows.hpp"
 #include "on_device.cuh"
+
+#include <bindings/value_rows.hpp>
 
 #include <memory>
 
 namespace voxelpipe::python {
+
+using namespace bindings; // what all bindings share
 
 template <class T, int Components>
 [[nodiscard]] counted_value_shader<T, Components> shader_of(const mesh_view<>& mesh, const device_values<T>& v) {

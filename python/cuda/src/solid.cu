@@ -1,11 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-#include "../../src/parts.hpp"
 #include "on_device.cuh"
 
+#include <bindings/parts.hpp>
 #include <voxelpipe/solid/diagnose_repair.hpp>
 
 namespace voxelpipe::python {
+
+using namespace bindings; // what all bindings share
 
 status draw_solid(const device_stream& on, const mesh_view<>& mesh, const std::vector<std::uint64_t>& first_triangles,
                   const grid& g, const solid_options& options, std::uint8_t* out) {

@@ -3,7 +3,7 @@
 #pragma once
 
 // Surfaces: remesh of closed, open and broken meshes in each place, at a level, as quads; extract of bits and of a
-// field.
+// field; values of vertices.
 
 #include "cases.hpp"
 
@@ -34,6 +34,34 @@ void remeshed(Backend& backend, digest& d, const mesh_data& m, const vp::grid& g
     const vp::mesh<Backend> mesh = upload(backend, m);
     vp::surface<Backend> surface(backend);
     add_surface(backend, d, surface, vp::remesh(backend, mesh, grid, vp::passthrough{}, surface, options));
+}
+
+struct surface_place {
+    glm::vec3 at;
+};
+struct hand_place_on {
+    VOXELPIPE_HD vp::vertex_output<surface_place> operator()(const vp::vertex<>& v) const {
+        return {v.position, {v.position}};
+    }
+};
+// Where, on which triangle, and the normal; a seventh of the triangles has no values.
+struct surface_values {
+    VOXELPIPE_HD auto operator()(const vp::fragment<surface_place>& f) const {
+        return vp::outputs(f.varyings.at, f.normal, f.primitive % 5).discard_if(f.triangle % 7 == 0);
+    }
+};
+
+template <class Backend>
+void remeshed_with_values(Backend& backend, digest& d, const mesh_data& m, const vp::grid& grid,
+                          const vp::remesh_options& options) {
+    const vp::mesh<Backend> mesh = upload(backend, m);
+    vp::surface<Backend, glm::vec3, glm::vec3, std::uint32_t> surface(backend);
+    const vp::status s = vp::remesh(backend, mesh, grid, hand_place_on{}, surface_values{}, surface, options);
+    add_surface(backend, d, surface, s);
+    d.add(std::vector<std::uint64_t>{s.surface.nearest_values});
+    d.add(vp::get<0>(surface).to_host(backend));
+    d.add(vp::get<1>(surface).to_host(backend));
+    d.add(vp::get<2>(surface).to_host(backend));
 }
 
 // Of the bits of a solid, and of a field of distances.
@@ -75,6 +103,16 @@ void add_surfaces(case_table<Backend>& cases) {
     level.level = 0.75;
     level.quads = true;
     remesh("level.quads", "torus", level);
+    const auto values = [&](const char* mesh, const vp::remesh_options& options) {
+        const vp::grid grid = grid_of({19, 17, 22});
+        cases.push_back(
+            {std::string("surfaces.values.") + mesh, [=, m = hashed_mesh(mesh)](Backend& backend, digest& d) {
+                 remeshed_with_values(backend, d, m, grid, options);
+             }});
+    };
+    values("shells", {});
+    values("open", lids);
+    values("torus", level);
     const auto extract = [&](const std::string& name, const char* mesh, bool from_field,
                              const vp::extract_options& options) {
         const vp::grid grid = grid_of({19, 17, 22}).crop({3, 2, 1}, {14, 13, 17});

@@ -378,7 +378,8 @@ void describe_picture(CLI::App& app, command_line& options, raw_options& raw) {
                    "sky, white, dark, transparent, #rrggbb, or #rrggbb,#rrggbb from top to bottom. Default: sky")
         ->option_text("COLOUR")
         ->group("Picture (.png)");
-    app.add_flag("--no-color", raw.no_color, "Show all voxels in one colour")->group("Picture (.png)");
+    app.add_flag("--no-color", raw.no_color, "Show all voxels in one colour; with --remesh, a mesh without colours")
+        ->group("Picture (.png)");
     app.add_flag("--no-edges", raw.no_edges, "No lines between voxels")->group("Picture (.png)");
     app.add_flag("--no-ground", raw.no_ground, "No shadow on the ground")->group("Picture (.png)");
 }

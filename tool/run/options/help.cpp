@@ -62,7 +62,7 @@ std::string help_footer() {
         "  what --solid RULE (default: nonzero) has inside at the voxels' centres; --close-holes, --vote and --solid\n"
         "  exterior with --closing repair models that are not closed. Vertices lie where the model crosses the lines\n"
         "  between centres, exactly; --iso D moves the surface outward by D, so that a sheet becomes a plate of 2 D.\n"
-        "  It runs on the CPU.\n"
+        "  They have the model's colours, unless --no-color is given, and normals. It runs on the CPU.\n"
         "\nDISTANCES (--distance)\n"
         "  The distance of every sample from the nearest triangle, float32, in the model's units, exact. It is a "
         "distance "

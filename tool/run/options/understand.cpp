@@ -354,7 +354,10 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     if (options.voxelize.remesh) needs_occupancy = false;
     if (targets.empty()) {
         targets.push_back(target::occupancy);
-        if (shows_colors && !raw.no_color && !options.voxelize.remesh) options.implied.push_back(target::color);
+        if (options.voxelize.remesh) // a mesh has colours unless all of them are .stl
+            shows_colors = std::any_of(options.outputs.begin(), options.outputs.end(),
+                                       [](const auto& output) { return lower_extension(output) != ".stl"; });
+        if (shows_colors && !raw.no_color) options.implied.push_back(target::color);
     }
     for (const std::filesystem::path& output : options.outputs)
         if (find_format(output)->has_layers &&

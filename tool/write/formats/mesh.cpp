@@ -5,23 +5,16 @@
 
 #include "mesh_parts.hpp"
 #include "model/parallel.hpp"
+#include "text.hpp"
 #include "write_items.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <optional>
 #include <string_view>
 
 namespace voxelize {
 namespace {
-
-// Decimal text of b / 255, short but exact enough to give b back.
-std::string fraction_text(int b) {
-    std::array<char, 16> text{};
-    const auto end = std::to_chars(text.data(), text.data() + text.size(), b / 255.0, std::chars_format::fixed, 4).ptr;
-    return {text.data(), end};
-}
 
 // FORMAT(text, brick, glm::ivec3 voxel) for every occupied voxel, in storage order.
 template <class Format>

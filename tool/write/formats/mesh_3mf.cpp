@@ -64,7 +64,7 @@ public:
                 if (n == 0) text += model_head;
                 if (n == 0 && !colors_.empty()) text += "<m:colorgroup id=\"2\">\n";
                 if (n < colors) {
-                    for_items(n, colors_.size(), [&](std::size_t i) { add_color(text, colors_[i]); });
+                    for_items(n, colors_.size(), [&](std::size_t i) { add_3mf_color(text, colors_[i]); });
                     return make(std::move(text));
                 }
                 if (n == colors && !faces_.empty()) text += begin_of_object();
@@ -97,15 +97,6 @@ private:
         const std::string with_color = colors_.empty() ? "" : " pid=\"2\" pindex=\"0\"";
         return std::string(colors_.empty() ? "" : "</m:colorgroup>\n") +
                "<object id=\"1\" type=\"model\" name=\"voxels\"" + with_color + ">\n<mesh>\n<vertices>\n";
-    }
-    static void add_color(std::string& text, std::uint32_t rgb) {
-        constexpr std::string_view digits = "0123456789ABCDEF";
-        text += "<m:color color=\"#";
-        for (const std::uint8_t c : {red(rgb), green(rgb), blue(rgb)}) {
-            text += digits[c >> 4U];
-            text += digits[c & 15U];
-        }
-        text += "\"/>\n";
     }
     void add_vertex(std::string& text, std::size_t n) const {
         const std::array<std::uint32_t, 3>& corner = mesh_.vertices[n].corner;
@@ -180,6 +171,16 @@ void write_package(output_file& out, const model_text& model, const write_option
 }
 
 } // namespace
+
+void add_3mf_color(std::string& text, std::uint32_t rgb) {
+    constexpr std::string_view digits = "0123456789ABCDEF";
+    text += "<m:color color=\"#";
+    for (const std::uint8_t c : {red(rgb), green(rgb), blue(rgb)}) {
+        text += digits[c >> 4U];
+        text += digits[c & 15U];
+    }
+    text += "\"/>\n";
+}
 
 void write_3mf_package(output_file& out, int compression, bool is_large, bool is_empty,
                        const std::function<void(const entry_sink&)>& objects) {

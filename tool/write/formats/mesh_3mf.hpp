@@ -7,9 +7,14 @@
 #include "output_file.hpp"
 #include "zip.hpp"
 
+#include <cstdint>
 #include <functional>
+#include <string>
 
 namespace voxelize {
+
+// Appends a colour of a colour group; rgb: sRGB bytes, red lowest.
+void add_3mf_color(std::string& text, std::uint32_t rgb);
 
 // `objects` hands over the text of object 1, or is not called where the model is empty. `is_large`: that may have 4 GiB
 // or more. The caller commits the file. Throws write_error.

@@ -16,4 +16,13 @@ namespace voxelize {
     return {text.data(), end};
 }
 
+// Decimal text with this many digits behind the point.
+[[nodiscard]] inline std::string decimal(double value, int digits) {
+    std::array<char, 64> text{};
+    const auto end = std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed, digits).ptr;
+    return {text.data(), end};
+}
+// The text of byte / 255, short but exact enough to give the byte back.
+[[nodiscard]] inline std::string fraction_text(int byte) { return decimal(byte / 255.0, 4); }
+
 } // namespace voxelize

@@ -23,11 +23,12 @@ struct pipeline_state {
     unsigned long long tile_pairs, tile_records;         // coarse raster
     unsigned long long list_fragments, fragment_records; // A-buffer
     unsigned long long list_voxels;
-    unsigned long long filtered, kept;              // listed fragments that the shader discards, and all others
-    unsigned int index_error;                       // bad_index, bad_numbers, stopped
-    unsigned int num_items, num_splits, num_images; // tile split; solids: the last two count long rows
-    unsigned int next_item;                         // fine raster; solids: entries that have a place
-    unsigned int num_ordered[5];                    // fragment order: lengths of order_lists
+    unsigned long long filtered, kept; // listed fragments that the shader discards, and all others
+    unsigned int index_error;          // bad_index, bad_numbers, stopped
+    // Tile split; solids: the last two count long rows; distances: short lists, long ones, parts of the longest ones.
+    unsigned int num_items, num_splits, num_images;
+    unsigned int next_item;         // fine raster; solids: entries that have a place
+    unsigned int num_ordered[5];    // fragment order: lengths of order_lists
     unsigned long long longest_run; // of those, the longest run of one voxel that is too long for a block
     struct {
         unsigned long long split, lengths[4];

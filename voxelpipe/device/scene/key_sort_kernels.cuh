@@ -2,13 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Kernels and launches of scene/key_sort.cuh.
+// Kernels and launches of scene/key_sort.cuh: CUB's sort, and one of our own for keys of 32 bits of which at most
+// max_narrow_bits are in use.
 
 #include <voxelpipe/device/base/block_scan.cuh>
 #include <voxelpipe/device/base/launch.cuh>
 #include <voxelpipe/device/base/lookback.cuh>
 #include <voxelpipe/device/scene/key_sort.cuh>
 #include <voxelpipe/tuning/tuning_fragments.hpp>
+
+#include <cub/device/device_radix_sort.cuh>
 
 #include <algorithm>
 #include <cstddef>
@@ -18,7 +21,7 @@ namespace voxelpipe::device {
 
 inline constexpr std::uint32_t key_sort_tile = tuning::key_sort_threads * tuning::key_sort_items,
                                max_key_digits = 1u << tuning::max_key_digit_bits;
-inline constexpr int max_key_passes = (64 + tuning::max_key_digit_bits - 1) / tuning::max_key_digit_bits;
+inline constexpr int max_key_passes = 2, max_narrow_bits = max_key_passes * tuning::max_key_digit_bits;
 static_assert(max_key_digits <= tuning::key_sort_threads, "a thread has one digit at most");
 
 // Memory of a sort of num pairs. The first array, and the words of the first pass, are zero before.
@@ -27,15 +30,16 @@ struct key_sort_memory {
         unsigned long long digits[max_key_passes][max_key_digits]; // counts; then the offset of each digit's first pair
         unsigned long long blocks_done;
     };
-    std::uint64_t num = 0, used = 0; // pairs; the key bits that count
-    int passes = 1, bits = 1;        // bits of a digit: passes are as few as possible, their digits of one size
+    std::uint64_t num = 0;    // pairs
+    std::uint32_t used = 0;   // the key bits that count
+    int passes = 1, bits = 1; // bits of a digit: passes are as few as possible, their digits of one size
     totals* all_tiles = nullptr;
     unsigned long long* words[2]{}; // [tile][digit], used by alternate passes: each pass zeros those of the next
 
     [[nodiscard]] static key_sort_memory take(arena& memory, std::uint64_t num, int key_bits) {
         key_sort_memory m;
         m.num = num;
-        m.used = key_bits < 64 ? (std::uint64_t{1} << key_bits) - 1 : ~std::uint64_t{0};
+        m.used = (1u << key_bits) - 1;
         m.passes = std::max((key_bits + tuning::max_key_digit_bits - 1) / tuning::max_key_digit_bits, 1);
         m.bits = std::max((key_bits + m.passes - 1) / m.passes, 1);
         m.all_tiles = memory.take<totals>(1);
@@ -45,16 +49,15 @@ struct key_sort_memory {
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_tiles() const { return (num + key_sort_tile - 1) / key_sort_tile; }
     [[nodiscard]] VOXELPIPE_HD std::uint32_t num_digits() const { return 1u << bits; }
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_words() const { return num_tiles() * num_digits(); }
-    template <class Key>
-    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t digit(Key key, int pass) const {
-        return static_cast<std::uint32_t>((key & static_cast<Key>(used)) >> pass * bits) & (num_digits() - 1);
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t digit(std::uint32_t key, int pass) const {
+        return (key & used) >> pass * bits & (num_digits() - 1);
     }
 };
 
 // Counts the digits of all passes, and computes the offset of each digit's first pair.
-template <class Key>
+template <int = 0>
 __global__
-__launch_bounds__(tuning::key_sort_threads) void count_key_digits_kernel(const Key* keys,
+__launch_bounds__(tuning::key_sort_threads) void count_key_digits_kernel(const std::uint32_t* keys,
                                                                          const __grid_constant__ key_sort_memory m) {
     constexpr unsigned threads = tuning::key_sort_threads;
     constexpr int at_once = 4; // loads in flight
@@ -68,7 +71,7 @@ __launch_bounds__(tuning::key_sort_threads) void count_key_digits_kernel(const K
     __syncthreads();
     const std::uint64_t stride = std::uint64_t{gridDim.x} * threads;
     for (std::uint64_t i = std::uint64_t{blockIdx.x} * threads + threadIdx.x; i < m.num; i += stride * at_once) {
-        Key key[at_once];
+        std::uint32_t key[at_once];
 #pragma unroll
         for (unsigned k = 0; k < at_once; ++k)
             if (i + k * stride < m.num) key[k] = keys[i + k * stride];
@@ -98,17 +101,16 @@ __launch_bounds__(tuning::key_sort_threads) void count_key_digits_kernel(const K
 
 // Pass `pass` over the digits. Keys and values go through shared memory one after the other, so that neighbouring
 // threads write neighbouring elements.
-template <class Key>
-__global__ __launch_bounds__(tuning::key_sort_threads, tuning::key_sort_blocks(sizeof(Key))) void sort_keys_kernel(
-    const Key* keys, Key* to_keys, const std::uint32_t* values, std::uint32_t* to_values,
+template <int = 0>
+__global__ __launch_bounds__(tuning::key_sort_threads, tuning::key_sort_blocks) void sort_keys_kernel(
+    const std::uint32_t* keys, std::uint32_t* to_keys, const std::uint32_t* values, std::uint32_t* to_values,
     const __grid_constant__ key_sort_memory m, int pass) {
     constexpr unsigned threads = tuning::key_sort_threads, items = tuning::key_sort_items, warps = threads / 32;
     constexpr unsigned digits_of_word = sizeof(std::uint32_t) / sizeof(std::uint16_t);
     static_assert(key_sort_tile < 1 << 16 && items % digits_of_word == 0);
     union tile_memory {
         std::uint16_t counts[warps][max_key_digits]; // each digit's pairs in a warp, then in the warps before it
-        Key keys[key_sort_tile];
-        std::uint32_t values[key_sort_tile];
+        std::uint32_t pairs[key_sort_tile];          // keys, then values
     };
     __shared__ tile_memory shared;
     __shared__ std::uint32_t starts[max_key_digits];       // by digit: the offset within the tile
@@ -123,11 +125,11 @@ __global__ __launch_bounds__(tuning::key_sort_threads, tuning::key_sort_blocks(s
     const auto length = static_cast<std::uint32_t>(m.num - begin < key_sort_tile ? m.num - begin : key_sort_tile);
     // A lane has every 32nd pair of its warp's. Elements beyond the last count as pairs with the largest key.
     const std::uint32_t first = warp * 32 * items + lane;
-    Key key[items];
+    std::uint32_t key[items];
     std::uint32_t slot[items];
 #pragma unroll
     for (std::uint32_t i = 0; i < items; ++i)
-        key[i] = first + 32 * i < length ? keys[begin + first + 32 * i] : static_cast<Key>(~Key{0});
+        key[i] = first + 32 * i < length ? keys[begin + first + 32 * i] : ~std::uint32_t{0};
 #pragma unroll
     for (std::uint32_t i = 0; i < items; ++i) {
         const std::uint32_t d = m.digit(key[i], pass);
@@ -166,7 +168,7 @@ __global__ __launch_bounds__(tuning::key_sort_threads, tuning::key_sort_blocks(s
     }
     __syncthreads(); // the counts have been read
 #pragma unroll
-    for (std::uint32_t i = 0; i < items; ++i) shared.keys[slot[i]] = key[i];
+    for (std::uint32_t i = 0; i < items; ++i) shared.pairs[slot[i]] = key[i];
     if (has_digit) {
         unsigned long long before = 0;
         if (blockIdx.x != 0) {
@@ -179,48 +181,73 @@ __global__ __launch_bounds__(tuning::key_sort_threads, tuning::key_sort_blocks(s
     std::uint32_t digits[items / digits_of_word]; // of the pairs that the thread writes, packed
 #pragma unroll
     for (std::uint32_t i = 0; i < items; ++i) {
-        const std::uint32_t at = threadIdx.x + threads * i, d = m.digit(shared.keys[at], pass);
-        if (at < length) to_keys[offsets[d] + at] = shared.keys[at];
+        const std::uint32_t at = threadIdx.x + threads * i, d = m.digit(shared.pairs[at], pass);
+        if (at < length) to_keys[offsets[d] + at] = shared.pairs[at];
         digits[i / digits_of_word] = i % digits_of_word == 0 ? d : digits[i / digits_of_word] | d << 16;
     }
     __syncthreads(); // the keys have been read
 #pragma unroll
     for (std::uint32_t i = 0; i < items; ++i)
-        if (first + 32 * i < length) shared.values[slot[i]] = values[begin + first + 32 * i];
+        if (first + 32 * i < length) shared.pairs[slot[i]] = values[begin + first + 32 * i];
     __syncthreads();
 #pragma unroll
     for (std::uint32_t i = 0; i < items; ++i) {
         const std::uint32_t at = threadIdx.x + threads * i;
         if (at < length)
-            to_values[offsets[digits[i / digits_of_word] >> i % digits_of_word * 16 & 0xffffu] + at] =
-                shared.values[at];
+            to_values[offsets[digits[i / digits_of_word] >> i % digits_of_word * 16 & 0xffffu] + at] = shared.pairs[at];
     }
 }
 
-template <class Key>
-std::size_t sort_bytes(std::uint64_t capacity, int bits) {
+[[nodiscard]] inline std::size_t narrow_sort_bytes(std::uint64_t capacity, int bits) {
     arena memory;
     (void)key_sort_memory::take(memory, capacity, bits);
     return memory.used();
 }
 
-template <class Key>
-int sort_by_cell(Key* const (&keys)[2], std::uint32_t* const (&values)[2], std::uint64_t capacity, int bits,
-                 void* storage, [[maybe_unused]] std::size_t bytes, stage where, cudaStream_t stream) {
-    if (capacity == 0) return 0;
-    VOXELPIPE_ASSERT(bytes >= sort_bytes<Key>(capacity, bits));
+template <int = 0>
+int sort_narrow_keys(std::uint32_t* const (&keys)[2], std::uint32_t* const (&values)[2], std::uint64_t capacity,
+                     int bits, void* storage, stage where, cudaStream_t stream) {
     arena memory(storage);
     const auto m = key_sort_memory::take(memory, capacity, bits);
     const auto* const end = reinterpret_cast<std::byte*>(m.words[0] + m.num_words());
     check(cudaMemsetAsync(storage, 0, static_cast<std::size_t>(end - static_cast<std::byte*>(storage)), stream), where);
     const std::uint64_t blocks = std::min(m.num_tiles(), static_cast<std::uint64_t>(num_multiprocessors()) * 2);
-    count_key_digits_kernel<Key><<<static_cast<unsigned>(blocks), tuning::key_sort_threads, 0, stream>>>(keys[0], m);
+    count_key_digits_kernel<<<static_cast<unsigned>(blocks), tuning::key_sort_threads, 0, stream>>>(keys[0], m);
     check(cudaGetLastError(), where);
     for (int p = 0; p < m.passes; ++p)
-        launch_behind(sort_keys_kernel<Key>, static_cast<unsigned>(m.num_tiles()), tuning::key_sort_threads, stream,
-                      where, static_cast<const Key*>(keys[p % 2]), keys[1 - p % 2],
+        launch_behind(sort_keys_kernel<>, static_cast<unsigned>(m.num_tiles()), tuning::key_sort_threads, stream, where,
+                      static_cast<const std::uint32_t*>(keys[p % 2]), keys[1 - p % 2],
                       static_cast<const std::uint32_t*>(values[p % 2]), values[1 - p % 2], m, p);
     return m.passes % 2;
+}
+
+template <class Key>
+cudaError_t sort_by_cub(void* storage, std::size_t& bytes, cub::DoubleBuffer<Key>& keys,
+                        cub::DoubleBuffer<std::uint32_t>& values, std::uint64_t num, int bits, cudaStream_t stream) {
+    return cub::DeviceRadixSort::SortPairs(storage, bytes, keys, values, num, 0, bits, stream);
+}
+
+template <class Key>
+std::size_t sort_bytes(std::uint64_t capacity, int bits) {
+    if (sizeof(Key) == sizeof(std::uint32_t) && bits <= max_narrow_bits) return narrow_sort_bytes(capacity, bits);
+    cub::DoubleBuffer<Key> keys;
+    cub::DoubleBuffer<std::uint32_t> values;
+    std::size_t bytes = 0;
+    check(sort_by_cub(nullptr, bytes, keys, values, capacity, bits, nullptr));
+    return bytes;
+}
+
+template <class Key>
+int sort_by_cell(Key* const (&keys)[2], std::uint32_t* const (&values)[2], std::uint64_t capacity, int bits,
+                 void* storage, std::size_t bytes, stage where, cudaStream_t stream) {
+    if (capacity == 0) return 0;
+    VOXELPIPE_ASSERT(bytes >= sort_bytes<Key>(capacity, bits));
+    if constexpr (sizeof(Key) == sizeof(std::uint32_t))
+        if (bits <= max_narrow_bits) return sort_narrow_keys(keys, values, capacity, bits, storage, where, stream);
+    cub::DoubleBuffer<Key> of_keys(keys[0], keys[1]);
+    cub::DoubleBuffer<std::uint32_t> of_values(values[0], values[1]);
+    check(sort_by_cub(storage, bytes, of_keys, of_values, capacity, bits, stream), where);
+    return of_keys.selector;
 }
 
 template <class Key>

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The prefix sum of counts, and the selection of each voxel's first fragment: one pass each, in which a tile learns
-// from earlier tiles how much is before it (base/lookback.cuh).
+// The prefix sum of counts, which is CUB's, and the selection of each voxel's first fragment among a number of them
+// that stays on the device, which CUB does not have: one pass, in which a tile learns from earlier tiles how much is
+// before it (base/lookback.cuh).
 
 #include <voxelpipe/device/base/kernel_library.cuh>
 #include <voxelpipe/device/scene/scene.cuh>

@@ -10,14 +10,16 @@
 #include <voxelpipe/device/scene/prefix_sum.cuh>
 #include <voxelpipe/tuning/tuning_fragments.hpp>
 
+#include <cub/device/device_scan.cuh>
+#include <cuda/std/functional>
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
 namespace voxelpipe::device {
 
-inline constexpr std::uint32_t prefix_sum_tile = threads_per_block * tuning::prefix_sum_items,
-                               selection_tile = threads_per_block * tuning::selection_items;
+inline constexpr std::uint32_t selection_tile = threads_per_block * tuning::selection_items;
 
 // Numbers of a block: the sum before its tile, which the first warp finds, and the sums before its threads.
 struct tile_scan {
@@ -40,43 +42,23 @@ struct tile_scan {
     }
 };
 
-// words: one of each tile, zero before.
-template <class Offset>
-__global__ __launch_bounds__(threads_per_block) void sum_counts_kernel(const std::uint32_t* counts, Offset* offsets,
-                                                                       std::uint32_t num, unsigned long long* words) {
-    constexpr unsigned items = tuning::prefix_sum_items;
-    __shared__ tile_scan scan;
-    await_stream();
-    const std::uint64_t first = std::uint64_t{blockIdx.x} * prefix_sum_tile + std::uint64_t{threadIdx.x} * items;
-    std::uint32_t count[items];
-    unsigned long long sum = 0, end = 0;
-#pragma unroll
-    for (unsigned k = 0; k < items; ++k) {
-        count[k] = first + k < num ? counts[first + k] : 0;
-        sum += count[k];
-    }
-    unsigned long long offset = scan.sum_before(words, sum, end);
-#pragma unroll
-    for (unsigned k = 0; k < items; ++k) {
-        if (first + k < num) offsets[first + k] = offset;
-        offset += count[k];
-    }
+// The first sum has 64 bits, and so have all: CUB adds counts of 32 bits in the type of the first.
+inline cudaError_t sum_by_cub(void* storage, std::size_t& bytes, const std::uint32_t* counts,
+                              unsigned long long* offsets, std::uint32_t num, cudaStream_t stream) {
+    return cub::DeviceScan::ExclusiveScan(storage, bytes, counts, offsets, cuda::std::plus<>{}, 0ull, num, stream);
 }
 
 VOXELPIPE_DEFINES_KERNELS std::size_t cell_scan_bytes(std::uint32_t num_primitives) {
-    return (std::size_t{num_primitives} + prefix_sum_tile - 1) / prefix_sum_tile * sizeof(unsigned long long);
+    std::size_t bytes = 0;
+    check(sum_by_cub(nullptr, bytes, nullptr, nullptr, num_primitives, nullptr));
+    return bytes;
 }
 
 VOXELPIPE_DEFINES_KERNELS void sum_counts(const std::uint32_t* counts, unsigned long long* offsets,
-                                          std::uint32_t num_primitives, void* storage,
-                                          [[maybe_unused]] std::size_t bytes, stage where, cudaStream_t stream) {
+                                          std::uint32_t num_primitives, void* storage, std::size_t bytes, stage where,
+                                          cudaStream_t stream) {
     if (num_primitives == 0) return;
-    VOXELPIPE_ASSERT(bytes >= cell_scan_bytes(num_primitives));
-    check(cudaMemsetAsync(storage, 0, cell_scan_bytes(num_primitives), stream), where);
-    const auto tiles = static_cast<unsigned>((std::uint64_t{num_primitives} + prefix_sum_tile - 1) / prefix_sum_tile);
-    sum_counts_kernel<unsigned long long><<<tiles, threads_per_block, 0, stream>>>(
-        counts, offsets, num_primitives, static_cast<unsigned long long*>(storage));
-    check(cudaGetLastError(), where);
+    check(sum_by_cub(storage, bytes, counts, offsets, num_primitives, stream), where);
 }
 
 // words: one of each tile, zero before.

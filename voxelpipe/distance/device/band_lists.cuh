@@ -13,6 +13,11 @@
 
 namespace voxelpipe::device {
 
+// A part of a list.
+struct list_part {
+    std::uint32_t slot, number, count; // the brick's place; of the part among count
+};
+
 // Arrays of the lists. Capacities are those of the call: tile_records for `records`, fragment_records for the bricks'
 // places and tile_pairs for the listed triangles.
 struct band_memory {
@@ -24,9 +29,20 @@ struct band_memory {
     std::uint32_t* short_ones;
     std::uint32_t* listed; // primitives
     chunk_record* records; // parts of large triangles
+    list_part* parts;      // of lists that are longer still, those of a list one after the other
+    // By part and octant: what its samples have in the part, and in the first part of a list how many parts are
+    // searched.
+    unsigned long long* part_squares;
+    std::uint32_t *part_primitives, *parts_done;
 
-    // Lists that a block searches together.
-    static constexpr std::uint32_t long_list = 512;
+    // Lists that a block searches together, and those that many blocks do, a part of part_length each.
+    static constexpr std::uint32_t long_list = 512, longest_list = 4096, part_length = 2048;
+    // A list of n triangles, more than longest_list, has at most n / part_length + 1 parts, and 1 is below n /
+    // longest_list.
+    [[nodiscard]] VOXELPIPE_HD static std::uint64_t max_parts(const capacities& limits) {
+        static_assert(longest_list == 2 * part_length);
+        return limits.tile_pairs * 3 / longest_list + 1;
+    }
     [[nodiscard]] static band_memory take(arena& a, std::uint32_t num_bricks, std::uint32_t* counts,
                                           const capacities& limits) {
         band_memory m{};
@@ -38,6 +54,10 @@ struct band_memory {
         m.short_ones = a.take<std::uint32_t>(limits.fragment_records);
         m.listed = a.take<std::uint32_t>(limits.tile_pairs);
         m.records = a.take<chunk_record>(limits.tile_records);
+        m.parts = a.take<list_part>(max_parts(limits));
+        m.part_squares = a.take<unsigned long long>(8 * octant_samples * max_parts(limits));
+        m.part_primitives = a.take<std::uint32_t>(8 * octant_samples * max_parts(limits));
+        m.parts_done = a.take<std::uint32_t>(8 * max_parts(limits));
         return m;
     }
 };
@@ -211,15 +231,16 @@ __global__ __launch_bounds__(threads_per_block) void place_bricks(std::uint32_t 
             const unsigned long long other = __shfl_up_sync(0xffffffffu, upto, step);
             if (lane >= step) upto += other;
         }
-        const unsigned is_long = __ballot_sync(0xffffffffu, count > band_memory::long_list);
+        const unsigned is_longest = __ballot_sync(0xffffffffu, count > band_memory::longest_list);
+        const unsigned is_long = __ballot_sync(0xffffffffu, count > band_memory::long_list) & ~is_longest;
+        const unsigned is_short = any & ~is_long & ~is_longest;
         unsigned long long first_slot = 0, first_pair = 0;
         unsigned first_long = 0, first_short = 0;
         if (lane == 31) {
             first_slot = atomicAdd(&state->fragment_records, static_cast<unsigned long long>(__popc(any)));
             first_pair = atomicAdd(&state->tile_pairs, upto);
             if (is_long != 0) first_long = atomicAdd(&state->num_splits, static_cast<unsigned>(__popc(is_long)));
-            if ((any & ~is_long) != 0)
-                first_short = atomicAdd(&state->num_items, static_cast<unsigned>(__popc(any & ~is_long)));
+            if (is_short != 0) first_short = atomicAdd(&state->num_items, static_cast<unsigned>(__popc(is_short)));
         }
         first_slot = __shfl_sync(0xffffffffu, first_slot, 31);
         first_pair = __shfl_sync(0xffffffffu, first_pair, 31);
@@ -236,8 +257,13 @@ __global__ __launch_bounds__(threads_per_block) void place_bricks(std::uint32_t 
         if (slot >= limits.fragment_records) continue;
         m.of_slot[slot] = static_cast<std::uint32_t>(at);
         const unsigned n_long = first_long + static_cast<unsigned>(__popc(is_long & before)),
-                       n_short = first_short + static_cast<unsigned>(__popc(any & ~is_long & before));
-        if ((is_long >> lane & 1u) == 0)
+                       n_short = first_short + static_cast<unsigned>(__popc(is_short & before));
+        if ((is_longest >> lane & 1u) != 0) {
+            const std::uint32_t parts = (count + band_memory::part_length - 1) / band_memory::part_length,
+                                first = atomicAdd(&state->num_images, parts);
+            for (std::uint32_t p = 0; p < parts && first + p < band_memory::max_parts(limits); ++p)
+                m.parts[first + p] = {static_cast<std::uint32_t>(slot), p, parts};
+        } else if ((is_short >> lane & 1u) != 0)
             m.short_ones[n_short] = static_cast<std::uint32_t>(slot);
         else if (n_long <= limits.tile_pairs / band_memory::long_list)
             m.long_ones[n_long] = static_cast<std::uint32_t>(slot);
@@ -279,6 +305,7 @@ void make_band_lists(const distance_input& in, const band_memory& m, pipeline_st
                      cudaStream_t stream) {
     constexpr stage where = stage::coarse_raster;
     const auto large = fill_device(limits.tile_records * threads_per_block);
+    check(cudaMemsetAsync(m.parts_done, 0, 8 * band_memory::max_parts(limits) * sizeof(std::uint32_t), stream), where);
     place_triangles<0><<<num_blocks(in.geo.num_primitives), threads_per_block, 0, stream>>>(in, m, state, limits);
     check(cudaGetLastError(), where);
     count_large_triangles<0><<<large, threads_per_block, 0, stream>>>(in, m, state, limits);

@@ -18,6 +18,8 @@ namespace voxelpipe::device {
 
 inline constexpr int distance_brick = 8; // samples of a brick's side
 inline constexpr std::uint32_t brick_samples = 512;
+inline constexpr int octant_side = 4;
+inline constexpr unsigned octant_samples = 64;
 inline constexpr std::uint32_t no_primitive = ~0u; // of a sample beyond the band
 inline constexpr std::uint32_t no_slot = ~0u;      // of a brick that no triangle is near
 

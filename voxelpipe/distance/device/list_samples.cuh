@@ -50,41 +50,44 @@ __global__ __launch_bounds__(threads_per_block) void list_samples_kernel(
                   z = static_cast<int>(i / static_cast<std::uint64_t>(in.extent.y));
         std::uint32_t count = 0;
         const unsigned long long first = is_counting ? 0 : rows.before[i];
-        for (int x0 = 0; x0 < in.extent.x; x0 += 32) {
-            const int x = x0 + lane;
-            std::uint32_t primitive = no_primitive;
-            float length = in.band;
-            if (x < in.extent.x) {
-                const std::uint64_t slot =
-                    found.slot_of(in.brick_number(x / distance_brick, y / distance_brick, z / distance_brick));
-                if (slot != no_slot || found.slots == nullptr) {
+        const int runs = sample_run::count(in.extent.x);
+        for (int r = 0; r < runs; ++r) {
+            const sample_run run = sample_run::of(in, found, r, y, z);
+            if (run.placed == 0) continue;
+            for (int part = 0; part < sample_run::samples / 32; ++part) {
+                if (!run.has_any(part)) continue;
+                const std::uint64_t slot = run.slot_of(part);
+                const int x0 = r * sample_run::samples + 32 * part, x = x0 + lane;
+                std::uint32_t primitive = no_primitive;
+                float length = in.band;
+                if (x < in.extent.x && slot != found_samples::nowhere) {
                     const std::uint64_t from = found_samples::place(slot, x, y, z);
                     primitive = found.primitives[from];
                     length = found.distances[from];
                 }
+                const bool in_band = primitive != no_primitive;
+                if (__ballot_sync(0xffffffffu, in_band) == 0) continue;
+                const word row = inside.row(x0, y, z);
+                using output_type = decltype(shade_sample(in, s, glm::ivec3(0), 0u, 0.0f, false));
+                output_type out{};
+                bool keeps = false;
+                if (in_band) {
+                    out = shade_sample(in, s, {x, y, z}, primitive, length, (row >> lane & 1u) != 0);
+                    keeps = out.keep;
+                    ++(keeps ? totals.fragments : totals.discarded);
+                    ++totals.in_band;
+                }
+                __syncwarp();
+                const unsigned kept = __ballot_sync(0xffffffffu, keeps);
+                if (!is_counting && keeps) {
+                    const unsigned long long at = first + count + static_cast<unsigned>(__popc(kept & before));
+                    to.voxels[at] = i * static_cast<std::uint64_t>(in.extent.x) + static_cast<std::uint64_t>(x);
+                    to.offsets[at] = at;
+                    to.primitives[at] = primitive;
+                    to.payloads[at] = out.values;
+                }
+                count += static_cast<unsigned>(__popc(kept));
             }
-            const bool in_band = primitive != no_primitive;
-            if (__ballot_sync(0xffffffffu, in_band) == 0) continue;
-            const word row = inside.row(x0, y, z);
-            using output_type = decltype(shade_sample(in, s, glm::ivec3(0), 0u, 0.0f, false));
-            output_type out{};
-            bool keeps = false;
-            if (in_band) {
-                out = shade_sample(in, s, {x, y, z}, primitive, length, (row >> lane & 1u) != 0);
-                keeps = out.keep;
-                ++(keeps ? totals.fragments : totals.discarded);
-                ++totals.in_band;
-            }
-            __syncwarp();
-            const unsigned kept = __ballot_sync(0xffffffffu, keeps);
-            if (!is_counting && keeps) {
-                const unsigned long long at = first + count + static_cast<unsigned>(__popc(kept & before));
-                to.voxels[at] = i * static_cast<std::uint64_t>(in.extent.x) + static_cast<std::uint64_t>(x);
-                to.offsets[at] = at;
-                to.primitives[at] = primitive;
-                to.payloads[at] = out.values;
-            }
-            count += static_cast<unsigned>(__popc(kept));
         }
         if (is_counting && lane == 0) rows.counts[i] = count;
     }

@@ -142,6 +142,31 @@ template <class Shading>
     return s.draw(f.draw).fragment_shader(f);
 }
 
+// A run of a row of samples along x: 32 bricks, of which each lane has one. A warp takes it, 32 samples at a time.
+struct sample_run {
+    static constexpr int bricks = 32, samples = bricks * distance_brick;
+    std::uint64_t slot; // of the lane's brick
+    unsigned placed;    // bits of the bricks that have a place
+
+    // run: number of the run in its row.
+    [[nodiscard]] __device__ static sample_run of(const distance_input& in, const found_samples& found, int run, int y,
+                                                  int z) {
+        const int brick = run * bricks + static_cast<int>(threadIdx.x % 32);
+        sample_run r{found_samples::nowhere, 0};
+        if (brick < in.bricks.x) r.slot = found.slot_of(in.brick_number(brick, y / distance_brick, z / distance_brick));
+        r.placed = __ballot_sync(0xffffffffu, r.slot != found_samples::nowhere);
+        return r;
+    }
+    // True if a brick of samples 32 part to 32 part + 31 has a place.
+    [[nodiscard]] __device__ bool has_any(int part) const { return (placed >> 4 * part & 0xfu) != 0; }
+    // Place of the lane's sample of a part. All lanes call it.
+    [[nodiscard]] __device__ std::uint64_t slot_of(int part) const {
+        return __shfl_sync(0xffffffffu, slot, 4 * part + static_cast<int>(threadIdx.x % 32) / distance_brick);
+    }
+    [[nodiscard]] VOXELPIPE_HD static int count(int samples_of_row) { return (samples_of_row + samples - 1) / samples; }
+};
+static_assert(32 % distance_brick == 0);
+
 struct sample_totals {
     unsigned long long fragments = 0, discarded = 0, in_band = 0;
     // All threads of the block call it.
@@ -163,39 +188,88 @@ __global__ __launch_bounds__(threads_per_block) void shade_samples_kernel(
     using fold = voxel_fold<Framebuffer>;
     if (has_failed(*state, limits)) return;
     const int lane = static_cast<int>(threadIdx.x % 32);
-    const auto words_x = static_cast<std::uint64_t>((in.extent.x + 31) / 32);
+    const auto runs_x = static_cast<std::uint64_t>(sample_run::count(in.extent.x));
     const std::uint64_t num =
-        words_x * static_cast<std::uint64_t>(in.extent.y) * static_cast<std::uint64_t>(in.extent.z);
+        runs_x * static_cast<std::uint64_t>(in.extent.y) * static_cast<std::uint64_t>(in.extent.z);
     const std::uint64_t warps = std::uint64_t{gridDim.x} * blockDim.x / 32;
     sample_totals totals;
     for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x / 32 + warp_in_block(); i < num; i += warps) {
-        const int x0 = static_cast<int>(i % words_x) * 32,
-                  y = static_cast<int>(i / words_x % static_cast<std::uint64_t>(in.extent.y)),
-                  z = static_cast<int>(i / words_x / static_cast<std::uint64_t>(in.extent.y)), x = x0 + lane;
-        const bool is_valid = x < in.extent.x;
-        const word row = inside.row(x0, y, z);
-        auto a = fold::begin(fb, is_valid, x, y, z);
-        bool has_any = false;
-        if (is_valid) {
-            std::uint32_t primitive = no_primitive;
-            float length = in.band;
-            if (found.primitives != nullptr) {
-                const std::uint64_t slot =
-                    found.slot_of(in.brick_number(x / distance_brick, y / distance_brick, z / distance_brick));
-                if (slot != no_slot || found.slots == nullptr) {
+        const int first = static_cast<int>(i % runs_x),
+                  y = static_cast<int>(i / runs_x % static_cast<std::uint64_t>(in.extent.y)),
+                  z = static_cast<int>(i / runs_x / static_cast<std::uint64_t>(in.extent.y));
+        const sample_run run = sample_run::of(in, found, first, y, z);
+        for (int part = 0; part < sample_run::samples / 32; ++part) {
+            const int x0 = first * sample_run::samples + 32 * part, x = x0 + lane;
+            if (x0 >= in.extent.x) break;
+            const std::uint64_t slot = run.slot_of(part);
+            const bool is_valid = x < in.extent.x;
+            const word row = inside.row(x0, y, z);
+            auto a = fold::begin(fb, is_valid, x, y, z);
+            bool has_any = false;
+            if (is_valid) {
+                std::uint32_t primitive = no_primitive;
+                float length = in.band;
+                if (slot != found_samples::nowhere) {
                     const std::uint64_t from = found_samples::place(slot, x, y, z);
                     primitive = found.primitives[from];
                     length = found.distances[from];
                 }
+                const auto out = shade_sample(in, s, {x, y, z}, primitive, length, (row >> lane & 1u) != 0);
+                has_any = out.keep;
+                ++(out.keep ? totals.fragments : totals.discarded);
+                totals.in_band += static_cast<unsigned>(primitive != no_primitive);
+                if (out.keep) fold::apply(a, out.values);
             }
-            const auto out = shade_sample(in, s, {x, y, z}, primitive, length, (row >> lane & 1u) != 0);
-            has_any = out.keep;
-            ++(out.keep ? totals.fragments : totals.discarded);
-            totals.in_band += static_cast<unsigned>(primitive != no_primitive);
-            if (out.keep) fold::apply(a, out.values);
+            __syncwarp();
+            if (__any_sync(0xffffffffu, static_cast<int>(has_any)) != 0) fold::store(fb, a, has_any, x0, y, z);
         }
-        __syncwarp();
-        if (__any_sync(0xffffffffu, static_cast<int>(has_any)) != 0) fold::store(fb, a, has_any, x0, y, z);
+    }
+    totals.add_up(count_voxels, state);
+}
+
+// Stores the distances of the ready shader into one target of floats that are replaced, aligned to 16 bytes: a lane
+// writes four samples, so that memory is what limits a large grid.
+template <int = 0>
+__global__ __launch_bounds__(threads_per_block) void store_field_kernel(const __grid_constant__ distance_input in,
+                                                                        const __grid_constant__ found_samples found,
+                                                                        const __grid_constant__ inside_rows inside,
+                                                                        float* to, bool count_voxels,
+                                                                        pipeline_state* state, capacities limits) {
+    if (has_failed(*state, limits)) return;
+    constexpr int each = 4, step = 32 * each, bricks = step / distance_brick;
+    const int lane = static_cast<int>(threadIdx.x % 32);
+    const auto runs_x = static_cast<std::uint64_t>(sample_run::count(in.extent.x)),
+               ny = static_cast<std::uint64_t>(in.extent.y);
+    const std::uint64_t num = runs_x * ny * static_cast<std::uint64_t>(in.extent.z),
+                        warps = std::uint64_t{gridDim.x} * blockDim.x / 32;
+    sample_totals totals;
+    for (std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x / 32 + warp_in_block(); i < num; i += warps) {
+        const std::uint64_t row = i / runs_x;
+        const int first = static_cast<int>(i % runs_x) * sample_run::samples, y = static_cast<int>(row % ny),
+                  z = static_cast<int>(row / ny);
+        const sample_run run = sample_run::of(in, found, first / sample_run::samples, y, z);
+        for (int part = 0; part < sample_run::samples / step; ++part) {
+            const int x = first + part * step + each * lane;
+            const std::uint64_t slot = __shfl_sync(0xffffffffu, run.slot, part * bricks + each * lane / distance_brick);
+            if (x >= in.extent.x) continue;
+            float4 length{in.band, in.band, in.band, in.band};
+            if (slot != found_samples::nowhere) {
+                const std::uint64_t from = found_samples::place(slot, x, y, z);
+                length = *reinterpret_cast<const float4*>(found.distances + from);
+                const uint4 nearest = *reinterpret_cast<const uint4*>(found.primitives + from);
+                totals.in_band += static_cast<unsigned>(nearest.x != no_primitive) +
+                                  static_cast<unsigned>(nearest.y != no_primitive) +
+                                  static_cast<unsigned>(nearest.z != no_primitive) +
+                                  static_cast<unsigned>(nearest.w != no_primitive);
+            }
+            const word inner = inside.row(x, y, z) >> x % 32;
+            const auto value = [&](float distance, int k) VOXELPIPE_INLINE_LAMBDA {
+                return (inner >> k & 1u) != 0 && distance > 0.0f ? -distance : distance;
+            };
+            totals.fragments += each;
+            *reinterpret_cast<float4*>(to + row * static_cast<std::uint64_t>(in.extent.x) + x) = {
+                value(length.x, 0), value(length.y, 1), value(length.z, 2), value(length.w, 3)};
+        }
     }
     totals.add_up(count_voxels, state);
 }
@@ -204,10 +278,21 @@ template <class Shading, class Framebuffer>
 void shade_samples(const distance_input& in, const Shading& s, const found_samples& found, const inside_rows& inside,
                    const Framebuffer& fb, bool count_voxels, pipeline_state* state, const capacities& limits,
                    cudaStream_t stream) {
-    const std::uint64_t samples = static_cast<std::uint64_t>((in.extent.x + 31) / 32) * 32 *
-                                  static_cast<std::uint64_t>(in.extent.y) * static_cast<std::uint64_t>(in.extent.z);
-    shade_samples_kernel<Shading, Framebuffer>
-        <<<fill_device(samples), threads_per_block, 0, stream>>>(in, s, found, inside, fb, count_voxels, state, limits);
+    const std::uint64_t runs = static_cast<std::uint64_t>(sample_run::count(in.extent.x)) *
+                               static_cast<std::uint64_t>(in.extent.y) * static_cast<std::uint64_t>(in.extent.z);
+    using field = framebuffer_view<target<float, blend::replace>>;
+    if constexpr (std::is_same_v<typename Shading::shader_type, distance> && std::is_same_v<Framebuffer, field>) {
+        const auto& t = voxelpipe::get<0>(fb.targets);
+        if (t.load != load_operation::off && in.extent.x % 4 == 0 &&
+            reinterpret_cast<std::uintptr_t>(t.elements) % sizeof(float4) == 0) {
+            store_field_kernel<0><<<fill_device(runs * 32), threads_per_block, 0, stream>>>(
+                in, found, inside, t.elements, count_voxels, state, limits);
+            check(cudaGetLastError(), stage::tile_resolve);
+            return;
+        }
+    }
+    shade_samples_kernel<Shading, Framebuffer><<<fill_device(runs * 32), threads_per_block, 0, stream>>>(
+        in, s, found, inside, fb, count_voxels, state, limits);
     check(cudaGetLastError(), stage::tile_resolve);
 }
 

@@ -148,6 +148,48 @@ struct frame_point {
     return frame_error * (magnitude(p.x) + magnitude(p.y) + magnitude(p.z) + reach + f.l);
 }
 
+// The vector to the point from the closest point of the triangle, whose length is the distance.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE frame_point from_closest(const triangle_frame& f, const frame_point& at) {
+    const auto cut = [](float t, float length) VOXELPIPE_INLINE_LAMBDA {
+        return t < 0.0f ? 0.0f : t > length ? length : t;
+    };
+    const float x = at.x, y = at.y, w = x - f.l;
+    const bool is_inside = (y > 0.0f) & (f.ux * y - f.uy * x < 0.0f) & (f.vx * y - f.vy * w > 0.0f);
+    if (is_inside) return {0.0f, 0.0f, at.z};
+    const float tu = cut(x * f.ux + y * f.uy, f.u_length), tv = cut(w * f.vx + y * f.vy, f.v_length);
+    const float ax = x - tu * f.ux, ay = y - tu * f.uy, bx = w - tv * f.vx, by = y - tv * f.vy;
+    frame_point r{x - cut(x, f.l), y, at.z};
+    float least = r.x * r.x + y * y;
+    if (ax * ax + ay * ay < least) {
+        r = {ax, ay, at.z};
+        least = ax * ax + ay * ay;
+    }
+    if (bx * bx + by * by < least) r = {bx, by, at.z};
+    return r;
+}
+
+// A plane that has the triangle on one side. A point's distance from the triangle is at least its height above the
+// plane, whatever the plane's direction: the triangle's farthest point in that direction, a vertex, bounds it.
+struct frame_plane {
+    float height;  // of the point that the plane was made for
+    float rise[3]; // of the height by a step of one voxel along each axis
+};
+// direction: of the plane's upper side, of any length that is not 0. The error of heights, of this point and of those
+// within the reach, is at most that of error_at: the point is off by 16 r R at most (frame_error), vertices by 1.5 r R,
+// axes by 2 r R; the direction's length is off by 8 r, also by an approximate root; products and sums are 6 + 4 + 6
+// roundings of R.
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE frame_plane make_plane(const triangle_frame& f, const frame_scale& scale,
+                                                                   const frame_point& at, const frame_point& direction,
+                                                                   float length) {
+    const float x = direction.x / length, y = direction.y / length, z = direction.z / length;
+    const float second = x * f.l, third = x * f.p + y * f.q;
+    float farthest = second > 0.0f ? second : 0.0f;
+    farthest = third > farthest ? third : farthest;
+    frame_plane r{x * at.x + y * at.y + z * at.z - farthest, {}};
+    for (int k = 0; k < 3; ++k) r.rise[k] = (x * f.x_axis[k] + y * f.y_axis[k] + z * f.z_axis[k]) * scale.voxel[k];
+    return r;
+}
+
 // The square of the point's distance from the triangle.
 [[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE float measure(const triangle_frame& f, const frame_point& at) {
     const auto cut = [](float t, float length) VOXELPIPE_INLINE_LAMBDA {

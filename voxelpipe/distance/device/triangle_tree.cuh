@@ -199,6 +199,29 @@ struct tree_point {
     return p;
 }
 
+// The same place as the centre of an octant that has a reference: boxes none of whose triangles can win are infinitely
+// far.
+struct tree_octant {
+    const tree_point& p;
+    const octant_search& search;
+
+    [[nodiscard]] __device__ VOXELPIPE_INLINE float distance_from(const tree_box& b) const {
+        float from[3], square = 0.0f;
+        for (int k = 0; k < 3; ++k) {
+            const float below = p.c[k] - b.low[k], above = p.c[k] - b.high[k];
+            from[k] = below < 0.0f ? below : above > 0.0f ? above : 0.0f;
+            square += from[k] * from[k];
+        }
+        const float root = sqrtf(square), distance = root * (1.0f - 0x1p-20f) - p.slack;
+        if (!(distance > 0.0f)) return distance;
+        // The plane through the box's closest point has the box below it.
+        float rise[3];
+        for (int k = 0; k < 3; ++k) rise[k] = from[k] / root * search.in.units.voxel[k];
+        const float height = distance - 0x1p-20f * search.in.octant_radius;
+        return search.is_below_corner(height, rise) ? distance : octant_search::infinity;
+    }
+};
+
 // Calls run(number) for the run of triangles at the end of the way down along the nearest boxes.
 template <class Run>
 __device__ VOXELPIPE_INLINE void visit_one_run(const distance_tree& t, const tree_point& p, const Run& run) {
@@ -261,10 +284,11 @@ __device__ VOXELPIPE_INLINE void visit_runs(const distance_tree& t, const Point&
 
 // The nearest triangles of all samples. A block takes a brick, a warp an octant.
 template <int = 0>
-__global__ __launch_bounds__(threads_per_block) void search_tree(const __grid_constant__ distance_input in,
-                                                                 const __grid_constant__ distance_tree t,
-                                                                 const __grid_constant__ found_samples to,
-                                                                 pipeline_state* state, capacities limits) {
+__global__ __launch_bounds__(threads_per_block,
+                             2) void search_tree(const __grid_constant__ distance_input in,
+                                                             const __grid_constant__ distance_tree t,
+                                                             const __grid_constant__ found_samples to,
+                                                             pipeline_state* state, capacities limits) {
     __shared__ octant_memory memory[warps_of_search];
     __shared__ tree_stack stacks[warps_of_search];
     __shared__ unsigned next;
@@ -278,21 +302,21 @@ __global__ __launch_bounds__(threads_per_block) void search_tree(const __grid_co
         if (brick >= in.num_bricks()) return;
         octant_search search(in, memory[warp], first_of_octant(in.first_sample(brick), warp));
         const tree_point p = make_tree_point(in, {search.centre[0], search.centre[1], search.centre[2]});
-        float nearest = octant_search::infinity;
+        near_triangle nearest = near_triangle::none();
         const auto look_at = [&](std::uint32_t run) {
             const std::uint64_t i = std::uint64_t{run} * 32 + lane;
-            float high = octant_search::infinity;
-            if (i < t.num_primitives && in.frames[t.order[i]].is_wide != 2) high = search.look(t.order[i]).high;
-            high = least_of_warp(high);
-            nearest = high < nearest ? high : nearest;
+            near_triangle own = near_triangle::none();
+            if (i < t.num_primitives && in.frames[t.order[i]].is_wide != 2)
+                own = {search.look(t.order[i]).high, t.order[i]};
+            nearest.take(own.of_warp());
         };
         visit_one_run(t, p, look_at);
         visit_runs(
-            t, p, stacks[warp], [&] { return nearest; }, look_at);
+            t, p, stacks[warp], [&] { return nearest.distance; }, look_at);
         search.begin(nearest);
         const float far = search.limit + in.octant_radius;
         visit_runs(
-            t, p, stacks[warp], [&] { return far; },
+            t, tree_octant{p, search}, stacks[warp], [&] { return far; },
             [&](std::uint32_t run) {
                 const std::uint64_t i = std::uint64_t{run} * 32 + lane;
                 const std::uint32_t id = i < t.num_primitives ? t.order[i] : 0;

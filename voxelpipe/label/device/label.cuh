@@ -104,7 +104,7 @@ struct flatten_segments {
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         const auto at = words.at(i);
         for (word left = core::segment_starts(words.rows.row(at.y, at.z)(at.x)); left != 0; left &= left - 1) {
-            const Number v = at.first + static_cast<Number>(exact::lowest_one(left)), root = sets.root(v);
+            const Number v = at.first + static_cast<Number>(exact::lowest_one(left)), root = sets.find(v);
             if (root != v)
                 sets.set_root(v, root);
             else

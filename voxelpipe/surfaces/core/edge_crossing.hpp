@@ -14,11 +14,11 @@ namespace voxelpipe::core {
 
 // A crossing of an edge as surfaces keep it.
 struct edge_crossing {
-    static constexpr int fraction = 24;                           // bits of t
-    static constexpr std::uint32_t middle = 1u << (fraction - 1); // t of a crossing that nothing places
-    static constexpr std::uint32_t no_source = ~std::uint32_t{0}; // of a crossing that no triangle makes
-    std::uint32_t t = middle;                                     // from the lower sample, in units of 2^-24
-    std::uint32_t source = no_source;                             // the primitive
+    static constexpr int fraction = 24;                             // bits of t
+    static constexpr std::uint32_t middle = 1u << (fraction - 1);   // t of a crossing that nothing places
+    static constexpr std::uint32_t no_triangle = ~std::uint32_t{0}; // of a crossing that no triangle of a draw makes
+    std::uint32_t t = middle;                                       // from the lower sample, in units of 2^-24
+    std::uint32_t triangle = no_triangle;                           // its number in the gathered mesh
     float nx = 0.0f, ny = 0.0f, nz = 0.0f; // outward unit normal in units of the samples' spacing; 0: no normal
 };
 

@@ -122,18 +122,20 @@ void choose_parts(Backend& backend, const extract_options& options, surface<Back
     out.sources = std::move(sources);
 }
 
-// The surface of cells whose crossings are known; null: all in the middle of their edges.
+// The surface of cells whose crossings are known; null: all in the middle of their edges. primitives: of the crossings'
+// triangles; null: vertices have no sources. Returns what the call returns, `result` with the surface's counts.
 template <class Backend>
 [[nodiscard]] status finish_surface(Backend& backend, const surface_cells<Backend>& cells, const grid& samples,
-                                    const edge_crossing* crossings, bool has_sources, const extract_options& options,
-                                    surface<Backend>& out, status result) {
+                                    const edge_crossing* crossings, const std::uint32_t* primitives,
+                                    const extract_options& options, surface<Backend>& out, status result) {
+    const bool has_sources = primitives != nullptr;
     surface<Backend> made(backend);
     made.samples = samples;
     made.vertices = typename Backend::template buffer<surface_vertex>(backend, cells.num_vertices());
     made.quads = typename Backend::template buffer<glm::uvec4>(backend, cells.num_edges());
     if (has_sources) made.sources = typename Backend::template buffer<std::uint32_t>(backend, cells.num_vertices());
     backend.for_each(cells.count(), passes::place_vertices{cells.list(), options.place, crossings, made.vertices.data(),
-                                                           has_sources ? made.sources.data() : nullptr});
+                                                           primitives, made.sources.data()});
     backend.for_each(cells.count(), passes::list_quads{cells.list(), made.quads.data()});
     choose_parts(backend, options, made, result.surface);
     result.surface.vertices = made.vertices.size();

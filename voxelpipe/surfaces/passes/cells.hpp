@@ -170,6 +170,11 @@ struct cell_list {
         for (int a = 0; a < axis; ++a) at += is_crossed(corners, 4 * a) ? 1 : 0;
         return at;
     }
+    // Number of crossed edge e of a cell.
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t crossing(const cell_key& at, int e) const {
+        const int corner = edge_corner(e);
+        return edge(find(at.x() + (corner & 1), at.y() + (corner >> 1 & 1), at.z() + (corner >> 2)), e >> 2);
+    }
 };
 
 // Decides the flips: a face both of whose segments lie in one sheet in both of its cells. Looks at samples alone, so

@@ -78,7 +78,7 @@ private:
         c.t = round_position(chosen.position);
         set_normal(c, n, Axis, goes_out);
         if (mesh.drawn > chosen.triangle)
-            c.source = mesh.primitives[chosen.triangle];
+            c.triangle = chosen.triangle;
         else
             add_shared(counts[static_cast<int>(edge_count::on_cones)], 1);
         return c;

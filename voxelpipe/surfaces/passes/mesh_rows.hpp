@@ -86,7 +86,8 @@ struct row_keys {
     int bits; // of what follows the row
 
     row_keys(const glm::ivec3& extent)
-        : samples(extent[Axis]), rows_u(extent[u]), rows_v(extent[v]), bits(ceil_log2(2 * (samples + 2))) {}
+        : samples(extent[Axis]), rows_u(extent[u]), rows_v(extent[v]), bits(ceil_log2(2 * (samples + 3))) {
+    } // room for what follows the last crossing
     [[nodiscard]] VOXELPIPE_HD std::uint64_t rows() const { return static_cast<std::uint64_t>(rows_u * rows_v); }
     [[nodiscard]] int key_bits() const { return bits + ceil_log2(rows_u * rows_v); }
     [[nodiscard]] VOXELPIPE_HD std::uint64_t row(std::int64_t at_u, std::int64_t at_v) const {

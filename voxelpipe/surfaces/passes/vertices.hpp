@@ -21,7 +21,8 @@ struct place_vertices {
     voxelpipe::place where;
     const edge_crossing* crossings; // null: all in the middle of their edges
     surface_vertex* vertices;
-    std::uint32_t* sources; // null: not wanted
+    const std::uint32_t* primitives; // of the triangles of crossings; null: sources are not wanted
+    std::uint32_t* sources;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         const auto cell = static_cast<std::uint32_t>(i);
@@ -30,12 +31,14 @@ struct place_vertices {
         for (int s = 0; s < sheets.count(); ++s) {
             const std::uint64_t v = cells.first_vertices[cell] + static_cast<std::uint64_t>(s);
             sheet_points points;
-            std::uint32_t source = edge_crossing::no_source;
+            std::uint32_t source = ~std::uint32_t{0};
             for (int e = 0; e < 12; ++e) {
                 if (sheets.of_edge(e) != s) continue;
                 const edge_crossing c = crossing(at, e);
                 points.add(e >> 2, edge_corner(e), c);
-                if (c.source < source) source = c.source;
+                if (primitives != nullptr && c.triangle != edge_crossing::no_triangle &&
+                    source > primitives[c.triangle])
+                    source = primitives[c.triangle];
             }
             const cell_place q = where == voxelpipe::place::corner ? cell_place{{{32768, 32768, 32768}}}
                                  : where == voxelpipe::place::mean ? points.mean()
@@ -43,15 +46,13 @@ struct place_vertices {
             vertices[v] = {glm::ivec3(at.x() - 1, at.y() - 1, at.z() - 1),
                            {q.q[0], q.q[1], q.q[2]},
                            static_cast<std::uint16_t>(s)};
-            if (sources != nullptr) sources[v] = source;
+            if (primitives != nullptr) sources[v] = source;
         }
     }
     // The crossing of an edge of a cell.
     [[nodiscard]] VOXELPIPE_HD edge_crossing crossing(const cell_key& at, int e) const {
         if (crossings == nullptr) return {};
-        const int corner = edge_corner(e);
-        return crossings[cells.edge(
-            cells.find(at.x() + (corner & 1), at.y() + (corner >> 1 & 1), at.z() + (corner >> 2)), e >> 2)];
+        return crossings[cells.crossing(at, e)];
     }
 };
 

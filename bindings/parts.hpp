@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Shared by the bindings of all languages: the parts of a mesh, each a draw of its own.
+
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <cstddef>
@@ -9,7 +11,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace voxelpipe::python {
+namespace voxelpipe::bindings {
 
 // One draw for each part of the triangles: part i ends where part i + 1 begins. Throws std::invalid_argument, which is
 // a ValueError, where they are out of order.
@@ -28,4 +30,4 @@ draws_of_parts(const mesh_view<>& all, const std::vector<std::uint64_t>& first_t
     return draws;
 }
 
-} // namespace voxelpipe::python
+} // namespace voxelpipe::bindings

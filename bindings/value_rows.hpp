@@ -3,7 +3,7 @@
 #pragma once
 
 // The fragment shader that bakes attributes: rows of values, one for each vertex or one for each triangle, read by
-// pointer, so that one pipeline serves both. The CPU's module and the GPU's share it.
+// pointer, so that one pipeline serves both. Shared by the bindings of all languages, on CPU and GPU.
 
 #include <voxelpipe/core/interpolate.hpp>
 #include <voxelpipe/voxelpipe.hpp>
@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <type_traits>
 
-namespace voxelpipe::python {
+namespace voxelpipe::bindings {
 
 // A scalar where there is one component.
 template <class T, int Components>
@@ -70,4 +70,4 @@ struct counted_value_shader {
 
 using number_of_fragments = target<std::uint32_t, blend::add>;
 
-} // namespace voxelpipe::python
+} // namespace voxelpipe::bindings

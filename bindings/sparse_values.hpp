@@ -1,0 +1,99 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Shared by the bindings of all languages: attributes that the CPU bakes into sparse framebuffers, which gives the
+// values of the voxels that have a fragment in the Morton order of the voxels, the same for every attribute of a mesh.
+
+#include <bindings/bits.hpp>
+#include <bindings/value_rows.hpp>
+
+#include <cpu_ref/backend.hpp>
+#include <voxelpipe/sparse/sparse.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+namespace voxelpipe::bindings {
+
+// A call's mesh, grid and values. The arrays are the caller's.
+template <class T>
+struct bake_call {
+    mesh_view<> mesh;
+    grid where;
+    coverage rule = coverage::conservative;
+    value_rows<T> rows;
+    unsigned threads = 0;
+};
+
+// Divides the sums of a mean by the numbers of fragments, each quotient rounded once. `values` has `components` for
+// each of the counts, none of which is 0.
+template <class T>
+void divide(T* values, const std::uint32_t* counts, std::size_t n, std::size_t components, unsigned threads) {
+    constexpr std::size_t block = std::size_t{1} << 16;
+    cpu::parallel_for(workers_of(threads), (n + block - 1) / block, [&](unsigned, std::size_t b) {
+        for (std::size_t i = b * block; i < std::min(n, (b + 1) * block); ++i)
+            for (std::size_t c = 0; c < components; ++c) values[i * components + c] /= static_cast<T>(counts[i]);
+    });
+}
+
+// Indices (x, y, z) of the voxels of a table, three for each, in Morton order; without those of tiles where they are
+// not wanted.
+[[nodiscard]] inline std::vector<std::int32_t> coordinates_of(const brick_table& table, bool with_tiles = true) {
+    std::vector<std::int32_t> coordinates;
+    coordinates.reserve(3 * (with_tiles ? table.num_voxels() : table.num_in_bricks()));
+    const auto add = [&](const glm::ivec3& p, std::uint64_t) {
+        coordinates.insert(coordinates.end(), {p.x, p.y, p.z});
+    };
+    for_each_brick_and_tile(
+        table, [&](std::uint64_t b) { for_each_voxel_in(table, b, add); },
+        [&](std::uint64_t t) {
+            if (with_tiles) for_each_voxel_in_tile(table, t, add);
+        });
+    return coordinates;
+}
+
+// Components values for each voxel, and the voxels' indices where they are asked for.
+template <class T>
+struct sparse_values {
+    std::vector<T> values;
+    std::vector<std::int32_t> coordinates;
+    std::size_t num_voxels = 0;
+    status result;
+};
+
+template <class T, int Components, class Blend>
+[[nodiscard]] sparse_values<T> draw_sparse_values(const bake_call<T>& call, bool is_mean, bool with_voxels) {
+    using value = value_of<T, Components>;
+    static_assert(sizeof(value) == Components * sizeof(T));
+    cpu_backend backend{call.threads};
+    sparse_framebuffer<cpu_backend, target<value, Blend>, number_of_fragments> fb{backend, call.where.extent};
+    sparse_values<T> drawn;
+    drawn.result = voxelize(backend, call.mesh, call.where, passthrough{},
+                            counted_value_shader<T, Components>{call.rows}, fb, voxelize_options{call.rule});
+    if (!drawn.result.ok()) return drawn;
+    drawn.num_voxels = fb.num_voxels();
+    if (with_voxels) drawn.coordinates = coordinates_of(fb.view().table);
+    const auto& values = get<0>(fb.contents().values);
+    const auto& counts = get<1>(fb.contents().values);
+    drawn.values.resize(drawn.num_voxels * Components);
+    if (drawn.num_voxels != 0) std::memcpy(drawn.values.data(), values.data(), drawn.num_voxels * sizeof(value));
+    if (is_mean) divide(drawn.values.data(), counts.data(), drawn.num_voxels, Components, call.threads);
+    return drawn;
+}
+
+// Of three columns the first ones: a lone column is drawn as one of three where that is rare, a third of the time to
+// compile.
+[[nodiscard]] inline sparse_values<float> first_columns(sparse_values<float>&& drawn, std::size_t columns) {
+    if (columns == 3) return std::move(drawn);
+    for (std::size_t i = 0; i < drawn.num_voxels; ++i)
+        for (std::size_t c = 0; c < columns; ++c) drawn.values[i * columns + c] = drawn.values[3 * i + c];
+    drawn.values.resize(drawn.num_voxels * columns);
+    return std::move(drawn);
+}
+
+} // namespace voxelpipe::bindings
