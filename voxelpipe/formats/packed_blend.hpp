@@ -4,7 +4,7 @@
 
 // Blends of packed formats, component by component: min, max, add and add_saturate, which are the same here, and the
 // mean. Where a step on the word gives the defined result in any order, the word is the accumulator. Otherwise the
-// components are accumulated exactly and packed once, at the end (docs/design.md, "Packed formats").
+// components are accumulated exactly and packed once, at the end (docs/guide.md, "Packed formats").
 
 #include <voxelpipe/blend.hpp>
 #include <voxelpipe/formats/exact_number.hpp>
