@@ -16,7 +16,7 @@ namespace voxelpipe::cpu {
 template <class Blend, class T>
 inline constexpr bool folds_once = std::is_same_v<Blend, blend::replace> || std::is_same_v<Blend, blend::min> ||
                                    std::is_same_v<Blend, blend::max> || std::is_same_v<Blend, blend::bit_and> ||
-                                   std::is_same_v<Blend, blend::bit_or> ||
+                                   std::is_same_v<Blend, blend::bit_or> || std::is_same_v<Blend, blend::mean> ||
                                    (std::is_same_v<Blend, blend::add_saturate> && std::is_same_v<T, bool>);
 
 template <class Target>
@@ -72,13 +72,19 @@ void cover_tile(const geometry& s, const core::voxel_box& tile, const std::uint3
     scratch.counts.fragments += fragments;
 }
 
+// The type of a constant shader's value for a target: the target's, or floats for a mean. Targets of blend::count
+// ignore the value, whatever its type.
+template <class Target, class Value>
+using folded_value = std::conditional_t<std::is_same_v<typename Target::blend_type, blend::mean>,
+                                        std::remove_cvref_t<Value>, typename Target::value_type>;
+
 // Folds a constant value into one target, 32 voxels along x at a time.
-template <class Target>
+template <class Target, class Value = typename Target::value_type>
 class constant_folder {
 public:
     using value_type = typename Target::value_type;
 
-    constant_folder(const target_view<Target>& t, const value_type& value) : t_(t), value_(value) {
+    constant_folder(const target_view<Target>& t, const Value& value) : t_(t), value_(value) {
         if constexpr (by_words) {
             from_zero_ = fold(false, 1) ? ~0u : 0u;
             from_one_ = fold(true, 1) ? ~0u : 0u;
@@ -121,18 +127,18 @@ private:
     }
 
     const target_view<Target>& t_;
-    const value_type& value_;
+    const Value& value_;
     std::uint32_t from_zero_ = 0, from_one_ = 0;
     std::array<value_type, num_known> known_{};
     std::uint32_t known_end_ = 0;
 };
 
 // `at`: position in the target of the tile's lowest voxel; x is a multiple of 32.
-template <class Target>
-void resolve_constant_target(const glm::ivec3& at, const target_view<Target>& t,
-                             const typename Target::value_type& value, const constant_scratch& scratch) {
+template <class Target, class Value>
+void resolve_constant_target(const glm::ivec3& at, const target_view<Target>& t, const Value& value,
+                             const constant_scratch& scratch) {
     const int x0 = at.x, y0 = at.y, z0 = at.z;
-    constant_folder<Target> folder(t, value);
+    constant_folder<Target, Value> folder(t, value);
     for (std::size_t row = 0; row < tile_rows; ++row) {
         const std::uint32_t word = scratch.touched[row];
         if (word == 0) continue;
@@ -148,8 +154,7 @@ void resolve_constant_tile(const glm::ivec3& at, const framebuffer_view<Targets.
     core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
         const auto& t = get<I>(fb.targets);
         using target_type = typename core::pack_element<I, Targets...>::type;
-        // Targets of blend::count ignore the value, whatever its type.
-        typename target_type::value_type value{};
+        folded_value<target_type, decltype(get<I>(values))> value{};
         if constexpr (!std::is_same_v<typename target_type::blend_type, blend::count>) value = get<I>(values);
         if (t.load != load_operation::off) resolve_constant_target<target_type>(at, t, value, scratch);
     });

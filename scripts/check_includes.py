@@ -14,10 +14,11 @@ The library's parts, from the top down; an include names a file of the same part
     solid
     label
     levels
+    formats
     voxelize.hpp and the other headers directly in voxelpipe/ (but voxelpipe.hpp, which includes all), and device/
     core, tuning
 
-Each module (slabs to levels) has its kernels in its own device/. core/ includes core/, tuning/ and config.hpp only.
+Each module (slabs to formats) has its kernels in its own device/. core/ includes core/, tuning/ and config.hpp only.
 Inside voxelpipe/device/ an include names a file of the same folder or of a folder further down:
 
     device/ itself      (backend, surface_calls, voxelize_async, abuffer_async)
@@ -49,7 +50,7 @@ import re
 import sys
 
 LAYERS = ["", "call", "tiles fragments", "raster", "targets", "scene", "base"]  # of device/, from the top down
-MODULES = ["slabs", "cells", "programs", "surfaces", "distance", "sparse", "solid", "label", "levels", "api", "core"]  # of voxelpipe/, from the top down
+MODULES = ["slabs", "cells", "programs", "surfaces", "distance", "sparse", "solid", "label", "levels", "formats", "api", "core"]  # of voxelpipe/, from the top down
 MAX_LOOSE = 4  # files directly in device/: what a reader meets first
 LEVEL = {folder: level for level, folders in enumerate(LAYERS) for folder in (folders.split() or [""])}
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)

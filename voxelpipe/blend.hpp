@@ -5,7 +5,8 @@
 // Blend modes: how the fragments of one voxel become one value (paper section 3, render targets). The fragments alone
 // determine every result, never a race: see docs/design.md, "Blending".
 //
-// A blend that is not order-free is folded in triangle order. User-defined blends: core/user_blend.hpp.
+// A blend that is not order-free is folded in triangle order. User-defined blends: core/user_blend.hpp. Blends of
+// packed formats, and the mean: formats/packed_blend.hpp.
 
 #include <voxelpipe/core/pack.hpp>
 #include <voxelpipe/core/reproducible_sum.hpp>
@@ -34,6 +35,7 @@ struct max {};           // floats by the same order
 struct bit_and {};       // integers and bit
 struct bit_or {};        // integers and bit
 struct bit_xor {};       // integers and bit
+struct mean {};          // half, bfloat16, float, packed formats: the exact mean of a call's fragments, rounded once
 struct count {};         // adds 1 per fragment, whatever the shader returns; wraps
 
 // add for float with a quantum of 2^Log2Quantum instead of 2^-32: terms from 2^(63 + Log2Quantum) on are infinite.
@@ -177,6 +179,8 @@ struct reproducible_blend {
             add_float<Log2Quantum>(a, v);
         else if constexpr (std::is_same_v<T, half>)
             add_half<Log2Quantum>(a, v);
+        else if constexpr (std::is_same_v<T, bfloat16>)
+            add_float<Log2Quantum>(a, static_cast<float>(v));
         else
             add_double<Log2Quantum>(a, v);
     }
@@ -187,6 +191,8 @@ struct reproducible_blend {
             return round_sum_to_float<Log2Quantum>(a);
         else if constexpr (std::is_same_v<T, half>)
             return core::bit_cast<T>(static_cast<bits>(round_sum(a, Log2Quantum, 10, 5)));
+        else if constexpr (std::is_same_v<T, bfloat16>)
+            return core::bit_cast<T>(static_cast<bits>(round_sum(a, Log2Quantum, 7, 8)));
         else
             return core::bit_cast<T>(static_cast<bits>(round_sum(a, Log2Quantum, 52, 11)));
     }
@@ -206,8 +212,8 @@ struct blend_traits<blend::add_unordered, T> : in_place_blend<T> {
     static T identity() { return core::bit_cast<T>(typename float_bits<T>::type{0}); }
     VOXELPIPE_HD
     static void apply(T& a, T v) {
-        if constexpr (std::is_same_v<T, half>)
-            a = canonical(half(exact::add(static_cast<float>(a), static_cast<float>(v))));
+        if constexpr (std::is_same_v<T, half> || std::is_same_v<T, bfloat16>)
+            a = canonical(T(exact::add(static_cast<float>(a), static_cast<float>(v))));
         else
             a = canonical(a + v);
     }

@@ -24,8 +24,10 @@
 
 namespace voxelpipe {
 
-// T: bit, an integer, half, float, double, a glm vector of 2 to 4 of them, or a trivially copyable struct with
-// blend::replace or a user-defined blend. The fragment shader has one output per target, of type T (bool for bit).
+// T: bit, an integer, half, bfloat16, float, double, a glm vector of 2 to 4 of them, a packed format
+// (formats/formats.hpp), or a trivially copyable struct with blend::replace or a user-defined blend. The fragment
+// shader has one output per target, of type T (bool for bit); for blend::mean it may be the floats that T is packed
+// from.
 template <class T, class Blend, class Layout = layout::linear>
 struct target {
     using map = core::storage_map<T, Layout>; // where a voxel lies in memory
@@ -44,7 +46,8 @@ struct target {
     static_assert(
         is_own_blend || traits::available,
         "voxelpipe: this blend mode is not defined for this value type (bitwise blends and count need integers "
-        "or bit, add_saturate integers, add_unordered floating types, a user struct its own blend)");
+        "or bit, add_saturate integers or packed formats, add_unordered floating types, mean half, bfloat16, "
+        "float or packed formats and the header formats/formats.hpp, a user struct its own blend)");
 };
 
 // The value of a voxel before its first fragment. clear: a clear value. load: what the memory holds. off: the target

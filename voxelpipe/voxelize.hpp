@@ -65,9 +65,12 @@ struct output_check<output<Ts...>> {
     static constexpr bool matches() {
         constexpr bool same = std::is_same_v<T, typename Target::value_type>;
         constexpr bool counts = std::is_same_v<typename Target::blend_type, blend::count>;
-        static_assert(same || counts, "voxelpipe: a fragment shader output has another type than its render target "
-                                      "(bool for bit; no conversion is made: write the type that you mean)");
-        return same || counts;
+        constexpr bool means = std::is_same_v<typename Target::blend_type, blend::mean> &&
+                               std::is_same_v<T, typename wide_value<typename Target::value_type>::type>;
+        static_assert(same || counts || means,
+                      "voxelpipe: a fragment shader output has another type than its render target "
+                      "(bool for bit; no conversion is made: write the type that you mean)");
+        return same || counts || means;
     }
     template <class... Targets>
     static constexpr bool fits_targets() {

@@ -13,6 +13,7 @@
 #include <voxelpipe/distance/distance.hpp>
 #include <voxelpipe/distance/distance_ray.hpp>
 #include <voxelpipe/distance/sparse_distance.hpp>
+#include <voxelpipe/formats/formats.hpp>
 #include <voxelpipe/framebuffer.hpp>
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/label/label.hpp>

@@ -116,6 +116,15 @@ private:
     counters counts_{};
 };
 
+// The values of a constant shader as its targets fold them, and the folders.
+template <class Values, class... Targets>
+struct folded_values;
+template <class... Values, class... Targets>
+struct folded_values<core::pack<Values...>, Targets...> {
+    using type = core::pack<folded_value<Targets, Values>...>;
+    using folders = core::pack<constant_folder<Targets, folded_value<Targets, Values>>...>;
+};
+
 template <class Values, class... Targets>
 class constant_sink final : public row_sink {
 public:
@@ -157,9 +166,11 @@ public:
     [[nodiscard]] const counters& counts() const { return counts_; }
 
 private:
+    using folded = folded_values<Values, Targets...>;
+
     // A count target ignores the value, whatever its type.
     template <class Target, class Value>
-    static typename Target::value_type target_value(const Value& value) {
+    static folded_value<Target, Value> target_value(const Value& value) {
         if constexpr (std::is_same_v<typename Target::blend_type, blend::count>)
             return {};
         else
@@ -167,18 +178,20 @@ private:
     }
     template <std::size_t... I>
     static auto target_values(const Values& values, std::index_sequence<I...>) {
-        return core::pack<typename Targets::value_type...>(core::make_pack(target_value<Targets>(get<I>(values))...));
+        return typename folded::type(core::make_pack(target_value<Targets>(get<I>(values))...));
     }
     template <std::size_t... I>
     auto make_folders(std::index_sequence<I...>) const {
-        return core::make_pack(constant_folder<Targets>(get<I>(fb_.targets), get<I>(values_))...);
+        return typename folded::folders(
+            core::make_pack(constant_folder<Targets, std::remove_cvref_t<decltype(get<I>(values_))>>(
+                get<I>(fb_.targets), get<I>(values_))...));
     }
 
-    core::pack<typename Targets::value_type...> values_;
+    typename folded::type values_;
     const framebuffer_view<Targets...>& fb_;
     std::vector<std::uint32_t> touched_;
     std::vector<std::uint32_t> repeats_; // fragments of each voxel of the row; empty where nobody needs them
-    core::pack<constant_folder<Targets>...> folders_;
+    typename folded::folders folders_;
     std::size_t first_ = touched_.size(), last_ = 0; // words that may be touched
     counters counts_{};
 };

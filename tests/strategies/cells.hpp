@@ -69,6 +69,16 @@ struct any_value<glm::vec<N, S, Q>> {
         return v;
     }
 };
+// Of packed formats: any pattern, or a packed vector of floats.
+template <class T>
+requires vp::core::is_packed<T>
+struct any_value<T> {
+    VOXELPIPE_HD static T make(std::uint32_t h, float f) {
+        if (h % 3 != 0) return T(any_value<typename T::wide_type>::make(h, f));
+        const std::uint64_t pattern = std::uint64_t{mix_bits(h + 3)} << 32 | mix_bits(h + 5);
+        return T::from_bits(static_cast<typename T::word_type>(pattern));
+    }
+};
 
 // One value per target, computed from the fragment's inputs. A fifth of the fragments is discarded.
 template <class... Targets>

@@ -6,6 +6,7 @@
 // saturating signed integers. Terms become fixed point by one rounding, the integer sum is exact for up to 2^32 terms,
 // and the result is rounded once (docs/design.md, "Reproducible addition").
 
+#include <voxelpipe/core/bfloat16.hpp>
 #include <voxelpipe/core/bits.hpp>
 #include <voxelpipe/core/half.hpp>
 
@@ -111,6 +112,8 @@ struct sum_format<float> {
     using sum = wide_sum<1>;
     static constexpr int log2_quantum = -32;
 };
+template <>
+struct sum_format<bfloat16> : sum_format<float> {};
 // 2^-24 is the smallest half: every term is exact.
 template <>
 struct sum_format<half> {

@@ -4,6 +4,7 @@
 
 // Properties of a render target's value type: its components, its canonical NaN, and its order.
 
+#include <voxelpipe/core/bfloat16.hpp>
 #include <voxelpipe/core/bits.hpp>
 #include <voxelpipe/core/half.hpp>
 
@@ -33,11 +34,20 @@ struct vector_traits<glm::vec<N, S, Q>> {
 };
 
 template <class T>
-inline constexpr bool is_floating = std::is_same_v<T, float> || std::is_same_v<T, double> || std::is_same_v<T, half>;
+inline constexpr bool is_floating =
+    std::is_same_v<T, float> || std::is_same_v<T, double> || std::is_same_v<T, half> || std::is_same_v<T, bfloat16>;
 template <class T>
 inline constexpr bool is_integer = std::is_integral_v<T> && !std::is_same_v<T, bool>;
 template <class T>
 inline constexpr bool is_scalar = is_floating<T> || is_integer<T> || std::is_same_v<T, bool>;
+
+// Formats of several components in one word (formats/formats.hpp).
+template <class T>
+inline constexpr bool is_packed = requires(const T& v) {
+    typename T::wide_type;
+    v.unpack();
+    v.canonical();
+};
 
 template <class T>
 struct float_bits;
@@ -45,6 +55,11 @@ template <>
 struct float_bits<half> {
     using type = std::uint16_t;
     static constexpr type infinity = 0x7c00u, nan = 0x7e00u;
+};
+template <>
+struct float_bits<bfloat16> {
+    using type = std::uint16_t;
+    static constexpr type infinity = 0x7f80u, nan = 0x7fc0u;
 };
 template <>
 struct float_bits<float> {
@@ -69,10 +84,31 @@ template <class T>
     } else if constexpr (vector_traits<T>::components > 1) {
         for (int i = 0; i < vector_traits<T>::components; ++i) v[i] = canonical(v[i]);
         return v;
+    } else if constexpr (is_packed<T>) {
+        return v.canonical();
     } else {
         return v;
     }
 }
+
+// The floats that a value is packed from; T itself where it is none of them.
+template <class T>
+struct wide_value {
+    using type = T;
+};
+template <class T>
+requires(std::is_same_v<T, half> || std::is_same_v<T, bfloat16>) struct wide_value<T> {
+    using type = float;
+};
+template <class T>
+requires is_packed<T>
+struct wide_value<T> {
+    using type = typename T::wide_type;
+};
+template <glm::length_t N, class S, glm::qualifier Q>
+struct wide_value<glm::vec<N, S, Q>> {
+    using type = glm::vec<N, typename wide_value<S>::type, Q>;
+};
 
 // Maps floats to integers of the same order, for shared-memory atomics on integers and for min and max.
 template <class T>

@@ -171,6 +171,10 @@ struct tree_sum_of<half> : float_tree_sum<half, 1, -24, 10, 5> {
     }
 };
 template <>
+struct tree_sum_of<bfloat16> : float_tree_sum<bfloat16, 1, -32, 7, 8> {
+    VOXELPIPE_HD static sum begin(bfloat16 v) { return tree_sum_of<float>::begin(static_cast<float>(v)); }
+};
+template <>
 struct tree_sum_of<double> : float_tree_sum<double, 2, -64, 52, 11> {
     VOXELPIPE_HD static sum begin(double v) {
         wide_sum<2> s{};

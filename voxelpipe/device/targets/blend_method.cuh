@@ -5,6 +5,7 @@
 // How a target's fragments are combined on the device: the words of values, including user-defined blends and,
 // component by component, vectors (targets/shared_blend.cuh has scalars); and those of bits.
 
+#include <voxelpipe/device/targets/lane_blend.cuh>
 #include <voxelpipe/device/targets/shared_blend.cuh>
 
 #include <cstdint>
@@ -21,11 +22,15 @@ enum class blend_method : std::uint8_t {
     ordered, // everything else: folded in primitive order through lists of fragments
 };
 
-// True for user-defined blends that are order-free, of at most 8 bytes: combined by compare-and-swap.
-// combine(identity(), v) must be v.
+// True for user-defined blends that are order-free, and for blends of packed words that say so, of at most 8 bytes:
+// combined by compare-and-swap. combine(identity(), v) must be v.
 template <class Blend, class T>
-inline constexpr bool swaps = (core::user_blend<Blend, T> ||
-                               core::user_blend_template<Blend, T>)&&core::blend_traits<Blend, T>::order_free
+inline constexpr bool swaps_words = requires {
+    core::blend_traits<Blend, T>::swaps;
+};
+template <class Blend, class T>
+inline constexpr bool swaps = (core::user_blend<Blend, T> || core::user_blend_template<Blend, T> ||
+                               swaps_words<Blend, T>)&&core::blend_traits<Blend, T>::order_free
                               && sizeof(T) <= 8;
 
 template <class Blend, class T>

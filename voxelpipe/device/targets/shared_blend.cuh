@@ -236,6 +236,10 @@ struct wide_sum_blend {
     __device__ static void accumulate(word* plane, int i, int n, S v) {
         cell term{};
         Traits::apply(term, v);
+        add(plane, i, n, term);
+    }
+    // Adds a sum with a top of 29 bits.
+    __device__ static void add(word* plane, int i, int n, const cell& term) {
         word carry = 0;
 #pragma unroll
         for (int k = 0; k < 2 * limbs; ++k) {

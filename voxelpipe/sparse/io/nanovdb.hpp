@@ -8,6 +8,7 @@
 // squared length, for vectors and colours, as NanoVDB has it). The checksum is of grid, tree and root; nothing is
 // compressed.
 
+#include <voxelpipe/formats/normalized.hpp>
 #include <voxelpipe/sparse/io/nanovdb_nodes.hpp>
 
 #include <algorithm>
@@ -43,7 +44,8 @@ public:
         grids_.push_back(std::make_unique<typed_grid<T>>(std::move(from)));
     }
     // A target of a sparse framebuffer: bits become a grid of booleans, half floats floats, small integers 32-bit ones,
-    // glm::u8vec4 colours. `host` has to stay until write().
+    // glm::u8vec4 and unorm8x4 colours, other packed formats the floats that they hold. `host` has to stay until
+    // write().
     template <std::size_t I, class... Targets>
     void add_target(const std::string& name, const host_sparse<Targets...>& host) {
         using target = typename core::pack_element<I, Targets...>::type;
@@ -87,10 +89,12 @@ public:
     // The type that a value has in a file.
     template <class V>
     static constexpr auto file_type_of() {
-        if constexpr (std::is_same_v<V, half>)
+        if constexpr (std::is_same_v<V, half> || std::is_same_v<V, bfloat16>)
             return float{};
-        else if constexpr (std::is_same_v<V, glm::u8vec4>)
+        else if constexpr (std::is_same_v<V, glm::u8vec4> || std::is_same_v<V, unorm8x4>)
             return nanovdb::rgba8{};
+        else if constexpr (core::is_packed<V>)
+            return typename V::wide_type{};
         else if constexpr (std::is_same_v<V, std::uint8_t> || std::is_same_v<V, std::uint16_t>)
             return std::uint32_t{};
         else if constexpr (std::is_same_v<V, std::int8_t>)
@@ -130,7 +134,9 @@ private:
 
     template <class To, class V>
     static nanovdb::stored_value<To> convert_value(const V& v) {
-        if constexpr (std::is_same_v<To, nanovdb::rgba8>)
+        if constexpr (std::is_same_v<V, unorm8x4>)
+            return {v.bits};
+        else if constexpr (std::is_same_v<To, nanovdb::rgba8>)
             return {std::uint32_t{v.r} | std::uint32_t{v.g} << 8 | std::uint32_t{v.b} << 16 | std::uint32_t{v.a} << 24};
         else
             return static_cast<nanovdb::stored_value<To>>(v);

@@ -70,7 +70,9 @@ struct octree_terms {
     [[nodiscard]] VOXELPIPE_HD node of_voxel(std::uint64_t rank) const {
         node n;
         n.count = counted.count(rank);
-        if constexpr (has_wide_sums<target> && is_floating<typename parts::scalar>) {
+        // A mean has no sum of its own: it does not tell how many terms it had.
+        if constexpr (has_wide_sums<target> && is_floating<typename parts::scalar> &&
+                      !std::is_same_v<typename target::blend_type, blend::mean>) {
             if (sums != nullptr) {
                 for (int c = 0; c < parts::count; ++c) {
                     if constexpr (parts::count > 1)
