@@ -79,8 +79,7 @@ int main() {
     vp::voxelize_cells(backend, mesh, grid, vp::passthrough{}, vp::fraction{}, covered).or_throw();
     // end snippet
     vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, vp::blend::bit_or>> centres{backend, grid.extent};
-    vp::voxelize_solid(backend, mesh, grid, vp::passthrough{}, vp::constant(true), centres)
-        .or_throw();
+    vp::voxelize_solid(backend, mesh, grid, vp::passthrough{}, vp::constant(true), centres).or_throw();
     const auto grey = vp::get<0>(covered).to_host_target(backend);
     const auto stairs = vp::get<0>(centres).to_host_target(backend);
 

@@ -47,7 +47,7 @@ template <class T, class Draw>
     return s;
 }
 
-// The same for bits, which become bytes where the array has those. draw(words).
+// Draws bits into the array's memory, which become bytes where the array has those. draw(words).
 template <class Draw>
 [[nodiscard]] status draw_bits_into(const vp_array* array, const grid& g, unsigned threads, const Draw& draw) {
     const array_place to = place_of(array, "out", {VP_TYPE_UINT8, VP_TYPE_BITS}, g.extent);

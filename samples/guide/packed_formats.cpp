@@ -14,8 +14,11 @@ namespace vp = voxelpipe;
 
 namespace {
 
+// Fractions are moved into the range before they are added up.
 struct one_mean {
-    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const { return vp::outputs(f.barycentric.x); }
+    VOXELPIPE_HD auto operator()(const vp::fragment<>& f) const {
+        return vp::outputs(glm::clamp(f.barycentric.x, 0.0f, 1.0f));
+    }
 };
 
 // The target of the guide, and the mean of one component in floats.

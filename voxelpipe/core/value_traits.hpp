@@ -91,7 +91,7 @@ template <class T>
     }
 }
 
-// The floats that a value is packed from; T itself where it is none of them.
+// The floats that a value is packed from; T itself for all other types.
 template <class T>
 struct wide_value {
     using type = T;

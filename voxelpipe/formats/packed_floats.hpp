@@ -113,7 +113,7 @@ struct rgb9e5 {
         v.bits = raw;
         return v;
     }
-    // The same of exact numbers.
+    // The word nearest to exact numbers.
     [[nodiscard]] VOXELPIPE_HD static rgb9e5 nearest(const core::exact_number& r, const core::exact_number& g,
                                                      const core::exact_number& b) {
         int exponent = 0;
