@@ -140,7 +140,7 @@ TYPED_TEST(PackedBlends, MeansOfFloatsArePackedOnce) {
             for (int i = 0; i < lanes<T>; ++i) // exact in the accumulator
                 v[i] = (static_cast<float>(random.below(1 << 20)) - 0x1p18f) * (random.one_in(3) ? 0x1p-16f : 0x1p-19f);
             if (random.one_in(9)) v[0] = infinity;
-            if (random.one_in(9)) v[1] = nan;
+            if (random.one_in(9)) v[1] = quiet_nan;
             packed.push_back(T(v));
         }
         for (int i = 0; i < lanes<T>; ++i) {
@@ -194,7 +194,8 @@ void expect_float_means() {
         for (T& v : values) {
             v = static_cast<T>(static_cast<float>(static_cast<std::int32_t>(random.next() >> 33) - (1 << 30)) *
                                (random.one_in(2) ? 0x1p-24f : 0x1p-31f));
-            if (random.one_in(30)) v = static_cast<T>(random.one_in(3) ? nan : random.one_in(2) ? infinity : -infinity);
+            if (random.one_in(30))
+                v = static_cast<T>(random.one_in(3) ? quiet_nan : random.one_in(2) ? infinity : -infinity);
             terms.push_back(number::of(static_cast<float>(v)));
         }
         const number mean = mean_number(terms, static_cast<std::int64_t>(values.size()));

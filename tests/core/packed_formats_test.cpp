@@ -134,8 +134,8 @@ TYPED_TEST(Packed, FloatsRoundOnceToTheNearestTiesToEven) {
 TYPED_TEST(Packed, TakesWhatIsNoNumberOrBeyondTheRange) {
     using T = TypeParam;
     const float denormal = std::numeric_limits<float>::denorm_min(), most = std::numeric_limits<float>::max();
-    for (const float f : {nan, -nan, infinity, -infinity, 0.0f, -0.0f, denormal, -denormal, most, -most, 1.0f, -1.0f,
-                          65024.0f, 65408.0f, 65471.9f, 65472.0f, 65536.0f, 65519.0f, 64512.0f})
+    for (const float f : {quiet_nan, -quiet_nan, infinity, -infinity, 0.0f, -0.0f, denormal, -denormal, most, -most,
+                          1.0f, -1.0f, 65024.0f, 65408.0f, 65471.9f, 65472.0f, 65536.0f, 65519.0f, 64512.0f})
         for (int i = 0; i < lanes<T>; ++i) {
             typename T::wide_type v(0.25f);
             v[i] = f;
@@ -145,14 +145,14 @@ TYPED_TEST(Packed, TakesWhatIsNoNumberOrBeyondTheRange) {
 }
 
 TEST(PackedNamed, ValuesAreThoseOfTheirDefinitions) {
-    EXPECT_EQ(vp::unorm8x4(glm::vec4(0, 1, 0.5f, nan)).bits, 0x0080ff00u); // 127.5 is a tie: to 128
+    EXPECT_EQ(vp::unorm8x4(glm::vec4(0, 1, 0.5f, quiet_nan)).bits, 0x0080ff00u); // 127.5 is a tie: to 128
     EXPECT_EQ(vp::unorm10_10_10_2(glm::vec4(1, 0, 0.5f, 0.5f)).bits, 2u << 30 | 512u << 20 | 1023u);
     EXPECT_EQ(vp::snorm8x2(glm::vec2(-7, 0.5f)).bits, 64u << 8 | 0x81u);
     EXPECT_EQ(vp::snorm16x2(glm::vec2(-0.5f, 1)).bits, 0x7fffc000u);
     EXPECT_EQ(vp::float11_11_10(glm::vec3(1, -2, infinity)).bits, 0x3e0u << 22 | 15u << 6);
-    EXPECT_EQ(vp::float11_11_10(glm::vec3(1e9f, nan, 1e9f)).unpack().x, 65024.0f);
-    EXPECT_EQ(vp::float11_11_10(glm::vec3(1e9f, nan, 1e9f)).unpack().z, 64512.0f);
-    EXPECT_EQ(vp::rgb9e5(glm::vec3(infinity, nan, -1)).unpack(), glm::vec3(65408, 0, 0));
+    EXPECT_EQ(vp::float11_11_10(glm::vec3(1e9f, quiet_nan, 1e9f)).unpack().x, 65024.0f);
+    EXPECT_EQ(vp::float11_11_10(glm::vec3(1e9f, quiet_nan, 1e9f)).unpack().z, 64512.0f);
+    EXPECT_EQ(vp::rgb9e5(glm::vec3(infinity, quiet_nan, -1)).unpack(), glm::vec3(65408, 0, 0));
     EXPECT_EQ(vp::rgb9e5(glm::vec3(1, 2, 3)).unpack(), glm::vec3(1, 2, 3));
     EXPECT_EQ(vp::bfloat16(std::numeric_limits<float>::max()).bits, 0x7f7fu);
     EXPECT_EQ(vp::bfloat16(-infinity).bits, 0xff80u);

@@ -21,7 +21,8 @@ namespace blend = voxelpipe::blend;
 using unit::rational;
 using unit::wide;
 
-inline constexpr float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
+inline constexpr float quiet_nan = std::numeric_limits<float>::quiet_NaN(),
+                       infinity = std::numeric_limits<float>::infinity();
 
 // ---- the oracle -----------------------------------------------------------------------------------------------------
 

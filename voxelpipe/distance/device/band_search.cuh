@@ -112,9 +112,9 @@ struct octant_item {
 template <int = 0>
 __global__ __launch_bounds__(threads_per_block,
                              band_search_blocks) void search_band(const __grid_constant__ distance_input in,
-                                                             const __grid_constant__ band_memory m,
-                                                             const __grid_constant__ found_samples to,
-                                                             pipeline_state* state, capacities limits) {
+                                                                  const __grid_constant__ band_memory m,
+                                                                  const __grid_constant__ found_samples to,
+                                                                  pipeline_state* state, capacities limits) {
     __shared__ octant_memory memory[warps_of_search];
     __shared__ near_triangle nearest_of[warps_of_search];
     if (has_failed(*state, limits)) return;

@@ -284,11 +284,10 @@ __device__ VOXELPIPE_INLINE void visit_runs(const distance_tree& t, const Point&
 
 // The nearest triangles of all samples. A block takes a brick, a warp an octant.
 template <int = 0>
-__global__ __launch_bounds__(threads_per_block,
-                             2) void search_tree(const __grid_constant__ distance_input in,
-                                                             const __grid_constant__ distance_tree t,
-                                                             const __grid_constant__ found_samples to,
-                                                             pipeline_state* state, capacities limits) {
+__global__ __launch_bounds__(threads_per_block, 2) void search_tree(const __grid_constant__ distance_input in,
+                                                                    const __grid_constant__ distance_tree t,
+                                                                    const __grid_constant__ found_samples to,
+                                                                    pipeline_state* state, capacities limits) {
     __shared__ octant_memory memory[warps_of_search];
     __shared__ tree_stack stacks[warps_of_search];
     __shared__ unsigned next;
