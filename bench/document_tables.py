@@ -127,7 +127,7 @@ def solids():
                     [short(r["baseline_ms"]), short(r["floor_ms"])])
     head = ["scene, N", "even_odd", "even_odd, async", "nonzero", "fastest published", "published / async", "published / even_odd",
             "published / nonzero", "baseline", "floor"]
-    return "\n\n".join([head_line("h200", "solids.csv") + " Milliseconds, medians of 15 calls.", table(head, body), solids_behind()])
+    return "\n\n".join([head_line("h200", "solids.csv") + " Milliseconds, medians of 7 calls.", table(head, body), solids_behind()])
 
 
 def solid_rules():
@@ -141,7 +141,7 @@ def solid_rules():
         body.append([f"{scene} {n}", short(odd["ms"]), short(nonzero["ms"]), f"{float(nonzero['ms']) / float(odd['ms']):.2f} ×"] +
                     [short(r["ms"]) for r in repairs] + [short(odd["floor_ms"])])
     head = ["scene, N", "even_odd", "nonzero", "nonzero / even_odd", "vote", "close_holes", "floor"]
-    return head_line("h200", "solids.csv") + " Milliseconds, medians of 15 calls.\n\n" + table(head, body)
+    return head_line("h200", "solids.csv") + " Milliseconds, medians of 7 calls.\n\n" + table(head, body)
 
 
 def speed():

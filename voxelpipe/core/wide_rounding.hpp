@@ -87,6 +87,7 @@ struct integer_and_exponent {
     std::uint64_t integer; // below 2^53
     int exponent;          // of 2
 };
+// The magnitude of a finite number as a product of both.
 [[nodiscard]] inline integer_and_exponent take_apart(double x) {
     const auto bits = std::bit_cast<std::uint64_t>(x);
     const auto field = static_cast<int>(bits >> 52 & 0x7ff);

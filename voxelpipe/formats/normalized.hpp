@@ -52,11 +52,12 @@ template <bool Signed>
 // complement from -(2^(b-1) - 1) to 2^(b-1) - 1 for -1 to 1; the code -2^(b-1) is -1 too, and targets store the other.
 template <bool Signed, int... Bits>
 struct normalized {
-    static constexpr int lanes = sizeof...(Bits);                         // components
-    static constexpr bool is_signed = Signed;                             // snorm, or unorm
-    static constexpr int total_bits = (Bits + ...);                       // 16, 32 or 64
-    using wide_type = glm::vec<lanes, float>;                             // what a word is packed from
-    using word_type = std::conditional_t<total_bits == 16, std::uint16_t, // what is stored
+    static constexpr int lanes = sizeof...(Bits);   // components
+    static constexpr bool is_signed = Signed;       // snorm, or unorm
+    static constexpr int total_bits = (Bits + ...); // 16, 32 or 64
+    using wide_type = glm::vec<lanes, float>;       // what a word is packed from
+    // What is stored.
+    using word_type = std::conditional_t<total_bits == 16, std::uint16_t,
                                          std::conditional_t<total_bits == 32, std::uint32_t, std::uint64_t>>;
     static_assert(total_bits == 16 || total_bits == 32 || total_bits == 64);
     static_assert(((Bits <= 16) && ...));
@@ -85,6 +86,7 @@ struct normalized {
         }
         return value;
     }
+    // The same as unpack().
     VOXELPIPE_HD
     explicit operator wide_type() const { return unpack(); }
 

@@ -20,9 +20,9 @@ namespace voxelpipe {
 // 5 of mantissa, as a half without its sign. Negative numbers and -infinity become 0. A finite number beyond the
 // greatest (65024, 65024, 64512) becomes that one, infinity stays infinite, and a NaN a NaN.
 struct float11_11_10 {
-    static constexpr int lanes = 3; // components
-    using wide_type = glm::vec3;    // what a word is packed from
-    using word_type = std::uint32_t;
+    static constexpr int lanes = 3;  // components
+    using wide_type = glm::vec3;     // what a word is packed from
+    using word_type = std::uint32_t; // what is stored
 
     std::uint32_t bits; // 11, 11 and 10, from the lowest bits up
 
@@ -41,6 +41,7 @@ struct float11_11_10 {
 
     // Exact.
     [[nodiscard]] VOXELPIPE_HD glm::vec3 unpack() const { return {component(0), component(1), component(2)}; }
+    // The same as unpack().
     VOXELPIPE_HD
     explicit operator glm::vec3() const { return unpack(); }
     // Component i as a float. Exact.
@@ -52,6 +53,7 @@ struct float11_11_10 {
     [[nodiscard]] VOXELPIPE_HD constexpr std::uint32_t code(int i) const {
         return bits >> (11 * i) & ((1u << (mantissa_bits(i) + 5)) - 1);
     }
+    // Sets the bits of component i, no more than it has.
     VOXELPIPE_HD
     constexpr void set_code(int i, std::uint32_t code) {
         const std::uint32_t mask = ((1u << (mantissa_bits(i) + 5)) - 1) << (11 * i);
@@ -82,6 +84,7 @@ struct float11_11_10 {
 
     // 6 or 5.
     [[nodiscard]] VOXELPIPE_HD static constexpr int mantissa_bits(int i) { return i < 2 ? 6 : 5; }
+    // The bits of infinity in component i.
     [[nodiscard]] VOXELPIPE_HD static constexpr std::uint32_t infinity_code(int i) { return 31u << mantissa_bits(i); }
     // The greatest of the order.
     [[nodiscard]] VOXELPIPE_HD static constexpr std::uint32_t nan_code(int i) {
@@ -96,9 +99,9 @@ struct float11_11_10 {
 // greatest component, rounded, fits; then each component is rounded at it, once. Negative numbers and NaN become 0,
 // infinity and what is beyond the greatest number, 65408, become that one.
 struct rgb9e5 {
-    static constexpr int lanes = 3; // components
-    using wide_type = glm::vec3;    // what a word is packed from
-    using word_type = std::uint32_t;
+    static constexpr int lanes = 3;  // components
+    using wide_type = glm::vec3;     // what a word is packed from
+    using word_type = std::uint32_t; // what is stored
 
     std::uint32_t bits; // 9, 9, 9 and 5, from the lowest bits up
 
@@ -127,6 +130,7 @@ struct rgb9e5 {
 
     // Exact.
     [[nodiscard]] VOXELPIPE_HD glm::vec3 unpack() const { return {component(0), component(1), component(2)}; }
+    // The same as unpack().
     VOXELPIPE_HD
     explicit operator glm::vec3() const { return unpack(); }
     // Component i as a float. Exact.

@@ -27,6 +27,7 @@
 
 namespace voxelpipe::slabs {
 
+// Throws std::system_error of an errno with what could not be done.
 [[noreturn]] inline void fail_temporary_file(int error, const std::string& what) {
     throw std::system_error(error, std::generic_category(), "voxelpipe::slabs: " + what);
 }
@@ -39,6 +40,7 @@ public:
     temporary_file& operator=(const temporary_file&) = delete;
 
 #if defined(_WIN32)
+    // folder: where the file is made.
     explicit temporary_file(const std::string& folder) {
         static std::atomic<unsigned> number{0};
         do {
@@ -68,6 +70,7 @@ private:
     static constexpr std::size_t most = std::size_t{1} << 30; // bytes that one call takes
     mutable std::mutex mutex_;
 #else
+    // folder: where the file is made.
     explicit temporary_file(const std::string& folder) {
         std::string name = folder + "/voxelpipe-XXXXXX";
         file_ = ::mkstemp(name.data());
