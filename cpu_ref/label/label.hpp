@@ -189,7 +189,7 @@ private:
     template <class OnSegment>
     static void write_word(word now, number* to, int count, const OnSegment& on_segment) {
         constexpr auto none = static_cast<number>(no_label);
-        std::array<number, bits + 4> out;
+        std::array<number, static_cast<std::size_t>(bits) + 4> out;
         const auto fill = [&](int first, int end, number value) {
             for (auto i = static_cast<unsigned>(first); i < static_cast<unsigned>(end); i += 4)
                 out[i] = out[i + 1] = out[i + 2] = out[i + 3] = value;

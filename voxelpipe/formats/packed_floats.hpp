@@ -13,6 +13,7 @@
 #include <glm/vec3.hpp>
 
 #include <cstdint>
+#include <initializer_list>
 
 namespace voxelpipe {
 

@@ -167,7 +167,7 @@ struct cell_list {
     [[nodiscard]] VOXELPIPE_HD std::uint64_t edge(std::uint32_t cell, int axis) const {
         const int corners = states[cell] & 255;
         std::uint64_t at = first_edges[cell];
-        for (int a = 0; a < axis; ++a) at += is_crossed(corners, 4 * a) ? 1 : 0;
+        for (int a = 0; a < axis; ++a) at += is_crossed(corners, 4 * a) ? 1U : 0U;
         return at;
     }
     // Number of crossed edge e of a cell.
