@@ -105,7 +105,7 @@ void bind_grid(nb::module_& m) {
                 check_shape(counts, "shape");
                 new (self) grid(make_grid(low, size, counts));
             },
-            nb::arg("origin"), nb::arg("voxel_size"), nb::arg("shape"),
+            nb::arg("origin").none(), nb::arg("voxel_size").none(), nb::arg("shape").none(),
             nb::sig("def __init__(self, origin: collections.abc.Sequence[float], voxel_size: "
                     "collections.abc.Sequence[float], shape: collections.abc.Sequence[int]) -> None"),
             "origin: world position (x, y, z) of the low corner. voxel_size: world units along x, y and z.\n"
@@ -131,7 +131,7 @@ void bind_grid(nb::module_& m) {
                 if (part.extent == part.whole) part.whole = glm::ivec3(0); // all of it: equal to the whole
                 return part;
             },
-            nb::arg("begin"), nb::arg("shape"),
+            nb::arg("begin").none(), nb::arg("shape").none(),
             nb::sig(
                 "def crop(self, begin: collections.abc.Sequence[int], shape: collections.abc.Sequence[int]) -> Grid"),
             "The part of `shape` (nz, ny, nx) that begins at voxel `begin` (z, y, x). What is drawn into a crop is, "
@@ -145,7 +145,7 @@ void bind_grid(nb::module_& m) {
                     g.to_world(to_vector({static_cast<double>(at[0]) + 0.5, static_cast<double>(at[1]) + 0.5,
                                           static_cast<double>(at[2]) + 0.5})));
             },
-            nb::arg("voxel"),
+            nb::arg("voxel").none(),
             nb::sig("def voxel_center(self, voxel: collections.abc.Sequence[int]) -> tuple[float, float, float]"),
             "World position of the centre of voxel (i, j, k), counted along x, y and z.")
         .def(

@@ -53,6 +53,8 @@ private:
             for (int i = 0; i < core::vector_traits<T>::components; ++i) put(v[i]);
         } else if constexpr (core::is_floating<T>) {
             put(core::bit_cast<typename core::float_bits<T>::type>(v));
+        } else if constexpr (core::is_packed<T>) {
+            put(v.bits);
         } else if constexpr (std::is_enum_v<T>) { // std::byte among them
             put(static_cast<std::underlying_type_t<T>>(v));
         } else {

@@ -44,6 +44,9 @@ template <class T>
         return (h & 1u) != 0;
     } else if constexpr (std::is_same_v<T, tagged>) {
         return tagged{h, static_cast<std::int32_t>(h % 1000u) - 500};
+    } else if constexpr (core::is_packed<T>) { // any pattern, or a vector of floats that is packed
+        if (h % 3u == 0) return T::from_bits(static_cast<typename T::word_type>(value_from<std::uint64_t>(h)));
+        return T(value_from<typename T::wide_type>(h));
     } else if constexpr (core::vector_traits<T>::components > 1) {
         T v;
         for (int i = 0; i < core::vector_traits<T>::components; ++i)
@@ -55,8 +58,8 @@ template <class T>
         const int whole = static_cast<int>(h >> 8) - (1 << 23);
         if constexpr (std::is_same_v<T, double>)
             return vp::exact::mul(static_cast<double>(whole), 0x1.8p-31);
-        else if constexpr (std::is_same_v<T, vp::half>)
-            return vp::half(vp::exact::mul(static_cast<float>(whole), 0x1p-18f));
+        else if constexpr (std::is_same_v<T, vp::half> || std::is_same_v<T, vp::bfloat16>)
+            return T(vp::exact::mul(static_cast<float>(whole), 0x1p-18f));
         else
             return vp::exact::mul(static_cast<float>(whole), 0x1.8p-15f);
     } else if constexpr (sizeof(T) == 8) {
@@ -229,6 +232,18 @@ void add_targets(case_table<Backend>& cases) {
                                                                            "uvec4.bit_xor", "ivec3.add_saturate",
                                                                            "u8vec4.max", "halfvec3.add", "i16vec2.add"},
                                                                           "", grid);
+    const auto add_packed = [&]<class Blend>(const Blend&, const std::array<const char*, 8>& names) {
+        target_group<target<vp::unorm8x4, Blend>, target<vp::unorm10_10_10_2, Blend>, target<vp::snorm8x4, Blend>,
+                     target<vp::snorm16x2, Blend>, target<vp::snorm16x4, Blend>, target<vp::float11_11_10, Blend>,
+                     target<vp::rgb9e5, Blend>, target<vp::bfloat16, Blend>>::template add<Backend>(cases, names, "",
+                                                                                                    grid);
+    };
+    add_packed(blend::add{}, {"unorm8x4.add", "unorm10_10_10_2.add", "snorm8x4.add", "snorm16x2.add", "snorm16x4.add",
+                              "float11_11_10.add", "rgb9e5.add", "bfloat16.add"});
+    add_packed(blend::min{}, {"unorm8x4.min", "unorm10_10_10_2.min", "snorm8x4.min", "snorm16x2.min", "snorm16x4.min",
+                              "float11_11_10.min", "rgb9e5.min", "bfloat16.min"});
+    add_packed(blend::mean{}, {"unorm8x4.mean", "unorm10_10_10_2.mean", "snorm8x4.mean", "snorm16x2.mean",
+                               "snorm16x4.mean", "float11_11_10.mean", "rgb9e5.mean", "bfloat16.mean"});
     for (const bool crop : {false, true})
         target_group<target<vp::bit, blend::bit_or, layout::tiled>, target<std::uint32_t, blend::max, layout::tiled>,
                      target<glm::vec3, blend::add, layout::tiled>, target<vp::half, blend::min, layout::tiled>,

@@ -228,8 +228,12 @@ template <class Backend, class Mesh, class VertexShader, class Shader, class... 
     typename Backend::template buffer<std::int64_t> nearest(backend, counts.nearest_values);
     backend.for_each(vertices, passes::list_missing{missing.data(), places.data(), made.vertices.data(), made.samples,
                                                     listed.data(), points.data()});
-    const status found = distance_at(backend, asked, g, backend_view<const glm::vec3>(points.view()),
-                                     {.nearest = nearest.data()}, {.sign = distance_sign::none});
+    distance_arrays wanted; // no names of members in braces: nvcc writes them in a form that clang++ warns of
+    wanted.nearest = nearest.data();
+    distance_options unsigned_ones;
+    unsigned_ones.sign = distance_sign::none;
+    const status found =
+        distance_at(backend, asked, g, backend_view<const glm::vec3>(points.view()), wanted, unsigned_ones);
     if (!found.ok()) return found;
     backend.for_each(counts.nearest_values,
                      passes::shade_nearest<view_type, Values...>{
