@@ -54,7 +54,9 @@ public:
         [[nodiscard]] std::size_t size() const { return count_; }
         [[nodiscard]] backend_view<const T> view() const { return {data_.get(), count_}; } // Refers to the buffer.
         // A copy of all elements.
-        [[nodiscard]] std::vector<T> to_host(cpu_backend&) const { return {data_.get(), data_.get() + count_}; }
+        [[nodiscard]] std::vector<T> to_host(cpu_backend&) const {
+            return std::vector<T>(data_.get(), data_.get() + count_); // braces would list two bools
+        }
         // Copies a box of elements. `to` has room for box.count() of them.
         void read_box(cpu_backend&, const core::element_box& box, T* to) const {
             for (std::size_t z = 0; z < box.slices; ++z)
