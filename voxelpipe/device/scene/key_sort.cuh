@@ -5,7 +5,7 @@
 // The sort of (cell, primitive) pairs by cell, for keys of 32 and of 64 bits and any number of pairs that memory holds.
 // It is stable and looks at just the key bits in use (paper section 4, tile sort). If only the device knows the number
 // of pairs, the whole capacity is sorted, with keys in the unused end that come last. CUB sorts, but for keys of 32
-// bits of which at most 18 are in use, as numbers of tiles are: two passes of nine bits take 0.72 to 0.95 of the time
+// bits of which at most 18 are in use, as numbers of tiles are: two passes of nine bits take 0.72 to 0.94 of the time
 // of CUB's three (docs/optimizations.md). fragments/radix_sort.cuh sorts fragments, whose number stays on the device.
 // Key: std::uint32_t or std::uint64_t.
 
