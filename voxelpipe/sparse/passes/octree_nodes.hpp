@@ -167,9 +167,13 @@ struct fold_octree_nodes {
             return;
         }
         const std::uint64_t first = level_nodes.first_child(i);
-        for (std::size_t c = 0; c < n; ++c)
-            children[c] = level == 1 ? value(rank_map<Target>::load(voxels, first + c)) : below[first + c];
+        children[0] = child(first); // outside the loop, for g++ -O2 warns of a loop that may not run
+        for (std::size_t c = 1; c < n; ++c) children[c] = child(first + c);
         values[i] = fold_of<Reducer, value>::fold(reducer, std::span<const value>(children, n));
+    }
+
+    [[nodiscard]] VOXELPIPE_HD value child(std::uint64_t k) const {
+        return level == 1 ? value(rank_map<Target>::load(voxels, k)) : below[k];
     }
 };
 
