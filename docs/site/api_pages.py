@@ -176,4 +176,5 @@ def write_api(out, xml, python_source):
             text += f".. image:: ../_static/{picture_of(name)}\n   :width: 360px\n   :alt: What {name} makes\n\n"
         elif name[0].islower() and name != "formats":
             sys.exit(f"{name} has no picture: docs/site/python_pictures.py")
+    text += heading("Dask: voxelpipe.dask", "-") + ".. automodule:: voxelpipe.dask\n   :members:\n\n"
     (folder / "python.rst").write_text(text, encoding="utf-8")

@@ -34,7 +34,7 @@ primary_domain = "cpp"
 highlight_language = "none"
 # The compiled module is not needed to read docstrings.
 sys.path.insert(0, os.environ["VOXELPIPE_PYTHON_SOURCE"])
-autodoc_mock_imports = ["voxelpipe._core"]
+autodoc_mock_imports = ["voxelpipe._core", "dask"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 exclude_patterns = ["_build"]
