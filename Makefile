@@ -8,6 +8,7 @@
 #   make docs                                     the site, in build/docs/html
 #   make dist                                     the source archive, in build/dist
 #   make wheels                                   wheels of the Python package that need no compiler, in build/wheels/dist
+#   make blender                                  the Blender add-on with those wheels, in build/blender
 #   make bench                                    the CPU table
 #   make bench-gpu                                the GPU table (needs nvcc and a GPU); make bench-scaling: its curves
 #   make clean                                    removes build/ and demo/
@@ -15,7 +16,7 @@
 MODEL ?=
 RESOLUTION ?= 256
 
-.PHONY: demo test docs dist wheels bench bench-gpu bench-scaling bench-tune clean
+.PHONY: demo test docs dist wheels blender bench bench-gpu bench-scaling bench-tune clean
 .DEFAULT_GOAL := demo
 
 demo:
@@ -32,6 +33,9 @@ dist:
 
 wheels:
 	@scripts/wheels.sh
+
+blender:
+	@scripts/blender.sh
 
 bench:
 	@scripts/bench.sh
