@@ -9,6 +9,7 @@
 #   make dist                                     the source archive, in build/dist
 #   make wheels                                   wheels of the Python package that need no compiler, in build/wheels/dist
 #   make blender                                  the Blender add-on with those wheels, in build/blender
+#   make release                                  all that a release holds, in build/release
 #   make bench                                    the CPU table
 #   make bench-gpu                                the GPU table (needs nvcc and a GPU); make bench-scaling: its curves
 #   make clean                                    removes build/ and demo/
@@ -16,7 +17,7 @@
 MODEL ?=
 RESOLUTION ?= 256
 
-.PHONY: demo test docs dist wheels blender bench bench-gpu bench-scaling bench-tune clean
+.PHONY: demo test docs dist wheels blender release bench bench-gpu bench-scaling bench-tune clean
 .DEFAULT_GOAL := demo
 
 demo:
@@ -36,6 +37,9 @@ wheels:
 
 blender:
 	@scripts/blender.sh
+
+release:
+	@scripts/release.sh
 
 bench:
 	@scripts/bench.sh

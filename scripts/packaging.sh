@@ -9,6 +9,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 need_packages python3 python3-venv
 scripts/version.py --check
 scripts/dist.sh --test
+scripts/release.sh --draft notes >/dev/null
 folder=$root/build/packaging
 archive=$(echo build/dist/voxelpipe-*.tar.gz)
 if ! cmp -s packaging/requirements-test.txt "$folder/venv/requirements.txt"; then
