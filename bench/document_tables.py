@@ -1,21 +1,22 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the tables of measured times in README.md and docs/performance_tables.md from records/.
+"""Writes the tables of measured times in README.md, docs/paper.md and docs/performance_tables.md from records/.
 
     document_tables.py [--update]
 
 A table stands between the lines `<!-- records: NAME -->` and `<!-- /records -->`. Without --update the script only compares, and
-fails where a document shows other figures than the records. Needs the standard library only.
+fails where a document, or the chart of docs/paper.md (bench/plot.py --paper), shows other figures than the records. Needs the standard library only.
 """
 import argparse
 import math
 import re
 import sys
 
+import paper as paper_figures
 from record import ROOT, read, sections
 
-DOCUMENTS = ["README.md", "docs/performance_tables.md"]
+DOCUMENTS = ["README.md", "docs/paper.md", "docs/performance_tables.md"]
 COLUMNS = [
     ("bit_conservative", "bit, conservative"),
     ("bit_thin", "bit, thin"),
@@ -186,7 +187,37 @@ def peers():
     return head_line("xeon", "python.csv") + " Milliseconds.\n\n" + table(["N"] + [name for _, name in columns], body)
 
 
-TABLES = {"peers": peers,
+def paper():
+    """The table of the paper, the 2011 code and ours."""
+    rows = paper_figures.rows()
+    columns = ["paper_one_thread_a_triangle", "paper_bit", "paper_float", "paper_abuffer", "original_bit", "original_float",
+               "original_abuffer", "ours_bit", "ours_float", "ours_abuffer", "ours_abuffer_conservative", "tiled_bit", "tiled_float"]
+    body = []
+    for r in rows:
+        name, there, here = paper_figures.SCENES[r["scene"]]
+        first = r["resolution"] == 128
+        what = f"{here}, {r['triangles']:,}" if f"{r['triangles']:,}" not in here else here
+        body.append([f"{name} ({there})" if first else "", what if first else "", f"{r['resolution']}³"] +
+                    [f"{r[c]:.1f}" if c.startswith("paper") else short(r[c]) for c in columns])
+    head = ["scene (triangles in the paper)", "mesh of the H200's columns", "grid", "paper, GTX 480: Schwarz & Seidel", "paper: binary",
+            "paper: float", "paper: A-buffer", "2011 code, H200: binary", "2011: float", "2011: A-buffer, thin", "ours, chosen: binary",
+            "ours: float", "ours: A-buffer, thin", "ours: A-buffer, conservative", "ours by tiles: binary", "by tiles: float"]
+    return head_line("h200") + " Milliseconds.\n\n" + table(head, body) + "\n\n" + paper_means(rows)
+
+
+def paper_means(rows):
+    """2011 / ours of each column: mean, least, greatest."""
+    pairs = [("binary, chosen", "original_bit", "ours_bit"), ("float, chosen", "original_float", "ours_float"),
+             ("A-buffer, thin", "original_abuffer", "ours_abuffer"), ("binary, tiles", "original_bit", "tiled_bit"),
+             ("float, tiles", "original_float", "tiled_float")]
+    body = []
+    for name, theirs, ours in pairs:
+        ratios = [r[theirs] / r[ours] for r in rows]
+        body.append([name, f"{mean(ratios):.2f} ×", f"{min(ratios):.2f} ×", f"{max(ratios):.2f} ×", str(sum(v < 1 for v in ratios))])
+    return table(["2011 code / ours, one H200", "mean of 15", "least", "greatest", "cells behind"], body)
+
+
+TABLES = {"peers": peers, "paper": paper,
           "times": times, "means": means, "speed": speed, "icosphere": icosphere, "solids": solids, "solid_rules": solid_rules}
 
 
@@ -205,6 +236,9 @@ def main():
         elif fresh != text:
             print(f"error: {name} shows other figures than records/; bench/document_tables.py --update writes them", file=sys.stderr)
             status = 1
+    if paper_figures.digest_of_png(paper_figures.CHART) != paper_figures.digest(paper_figures.rows()):
+        print(f"error: {paper_figures.CHART.name} shows other figures than records/; bench/plot.py --paper --out docs draws it", file=sys.stderr)
+        status = 1
     return status
 
 
