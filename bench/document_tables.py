@@ -187,26 +187,41 @@ def peers():
     return head_line("xeon", "python.csv") + " Milliseconds.\n\n" + table(["N"] + [name for _, name in columns], body)
 
 
-def paper():
-    """The table of the paper, the 2011 code and ours."""
-    rows = paper_figures.rows()
-    columns = ["paper_one_thread_a_triangle", "paper_bit", "paper_float", "paper_abuffer", "original_bit", "original_float",
-               "original_abuffer", "ours_bit", "ours_float", "ours_abuffer", "ours_abuffer_conservative", "tiled_bit", "tiled_float"]
+def paper(title, columns):
+    """Columns of the paper beside those of the H200, every scene and grid."""
     body = []
-    for r in rows:
-        name, there, here = paper_figures.SCENES[r["scene"]]
-        first = r["resolution"] == 128
-        what = f"{here}, {r['triangles']:,}" if f"{r['triangles']:,}" not in here else here
-        body.append([f"{name} ({there})" if first else "", what if first else "", f"{r['resolution']}³"] +
-                    [f"{r[c]:.1f}" if c.startswith("paper") else short(r[c]) for c in columns])
-    head = ["scene (triangles in the paper)", "mesh of the H200's columns", "grid", "paper, GTX 480: Schwarz & Seidel", "paper: binary",
-            "paper: float", "paper: A-buffer", "2011 code, H200: binary", "2011: float", "2011: A-buffer, thin", "ours, chosen: binary",
-            "ours: float", "ours: A-buffer, thin", "ours: A-buffer, conservative", "ours by tiles: binary", "by tiles: float"]
-    return head_line("h200") + " Milliseconds.\n\n" + table(head, body) + "\n\n" + paper_means(rows)
+    for r in paper_figures.rows():
+        name, _, here = paper_figures.SCENES[r["scene"]]
+        what = f"{name}, {re.split('[,:]', here)[0]}" if r["resolution"] == 128 else ""
+        body.append([what, f"{r['resolution']}³"] + [f"{r[c]:.1f}" if c.startswith("paper") else short(r[c]) for _, c in columns])
+    return f"{title}, milliseconds. H200, ours: " + head_line("h200") + "\n\n" + table(["scene, its mesh on the H200", "N"] + [t for t, _ in columns], body)
 
 
-def paper_means(rows):
+def paper_scenes():
+    """Which mesh stands for each scene of the paper."""
+    triangles = {r["scene"]: r["triangles"] for r in paper_figures.rows()}
+    body = [[name, there, here, f"{triangles[scene]:,}"] for scene, (name, there, here) in paper_figures.SCENES.items()]
+    return table(["scene", "triangles in the paper", "mesh on the H200", "its triangles"], body)
+
+
+def paper_binary():
+    return paper("Binary output", [("GTX 480, paper: Schwarz & Seidel", "paper_one_thread_a_triangle"), ("GTX 480, paper: VoxelPipe", "paper_bit"),
+                                   ("H200: 2011 code", "original_bit"), ("H200: ours by tiles", "tiled_bit"), ("H200: ours", "ours_bit")])
+
+
+def paper_float():
+    return paper("Float output", [("GTX 480, paper: VoxelPipe", "paper_float"), ("H200: 2011 code", "original_float"),
+                                  ("H200: ours by tiles", "tiled_float"), ("H200: ours", "ours_float")])
+
+
+def paper_abuffer():
+    return paper("A-buffer", [("GTX 480, paper: VoxelPipe", "paper_abuffer"), ("H200: 2011 code, thin", "original_abuffer"),
+                              ("H200: ours, thin", "ours_abuffer"), ("H200: ours, conservative", "ours_abuffer_conservative")])
+
+
+def paper_means():
     """2011 / ours of each column: mean, least, greatest."""
+    rows = paper_figures.rows()
     pairs = [("binary, chosen", "original_bit", "ours_bit"), ("float, chosen", "original_float", "ours_float"),
              ("A-buffer, thin", "original_abuffer", "ours_abuffer"), ("binary, tiles", "original_bit", "tiled_bit"),
              ("float, tiles", "original_float", "tiled_float")]
@@ -217,7 +232,8 @@ def paper_means(rows):
     return table(["2011 code / ours, one H200", "mean of 15", "least", "greatest", "cells behind"], body)
 
 
-TABLES = {"peers": peers, "paper": paper,
+TABLES = {"peers": peers, "paper_scenes": paper_scenes, "paper_binary": paper_binary, "paper_float": paper_float, "paper_abuffer": paper_abuffer,
+          "paper_means": paper_means,
           "times": times, "means": means, "speed": speed, "icosphere": icosphere, "solids": solids, "solid_rules": solid_rules}
 
 
