@@ -1,21 +1,22 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the tables of measured times in README.md and docs/performance_tables.md from records/.
+"""Writes the tables of measured times in README.md, docs/paper.md and docs/performance_tables.md from records/.
 
     document_tables.py [--update]
 
 A table stands between the lines `<!-- records: NAME -->` and `<!-- /records -->`. Without --update the script only compares, and
-fails where a document shows other figures than the records. Needs the standard library only.
+fails where a document, or the chart of docs/paper.md (bench/plot.py --paper), shows other figures than the records. Needs the standard library only.
 """
 import argparse
 import math
 import re
 import sys
 
+import paper as paper_figures
 from record import ROOT, read, sections
 
-DOCUMENTS = ["README.md", "docs/performance_tables.md"]
+DOCUMENTS = ["README.md", "docs/paper.md", "docs/performance_tables.md"]
 COLUMNS = [
     ("bit_conservative", "bit, conservative"),
     ("bit_thin", "bit, thin"),
@@ -186,7 +187,53 @@ def peers():
     return head_line("xeon", "python.csv") + " Milliseconds.\n\n" + table(["N"] + [name for _, name in columns], body)
 
 
-TABLES = {"peers": peers,
+def paper(title, columns):
+    """Columns of the paper beside those of the H200, every scene and grid."""
+    body = []
+    for r in paper_figures.rows():
+        name, _, here = paper_figures.SCENES[r["scene"]]
+        what = f"{name}, {re.split('[,:]', here)[0]}" if r["resolution"] == 128 else ""
+        body.append([what, f"{r['resolution']}³"] + [f"{r[c]:.1f}" if c.startswith("paper") else short(r[c]) for _, c in columns])
+    return f"{title}, milliseconds. H200, ours: " + head_line("h200") + "\n\n" + table(["scene, its mesh on the H200", "N"] + [t for t, _ in columns], body)
+
+
+def paper_scenes():
+    """Which mesh stands for each scene of the paper."""
+    triangles = {r["scene"]: r["triangles"] for r in paper_figures.rows()}
+    body = [[name, there, here, f"{triangles[scene]:,}"] for scene, (name, there, here) in paper_figures.SCENES.items()]
+    return table(["scene", "triangles in the paper", "mesh on the H200", "its triangles"], body)
+
+
+def paper_binary():
+    return paper("Binary output", [("GTX 480, paper: Schwarz & Seidel", "paper_one_thread_a_triangle"), ("GTX 480, paper: VoxelPipe", "paper_bit"),
+                                   ("H200: 2011 code", "original_bit"), ("H200: ours by tiles", "tiled_bit"), ("H200: ours", "ours_bit")])
+
+
+def paper_float():
+    return paper("Float output", [("GTX 480, paper: VoxelPipe", "paper_float"), ("H200: 2011 code", "original_float"),
+                                  ("H200: ours by tiles", "tiled_float"), ("H200: ours", "ours_float")])
+
+
+def paper_abuffer():
+    return paper("A-buffer", [("GTX 480, paper: VoxelPipe", "paper_abuffer"), ("H200: 2011 code, thin", "original_abuffer"),
+                              ("H200: ours, thin", "ours_abuffer"), ("H200: ours, conservative", "ours_abuffer_conservative")])
+
+
+def paper_means():
+    """2011 / ours of each column: mean, least, greatest."""
+    rows = paper_figures.rows()
+    pairs = [("binary, chosen", "original_bit", "ours_bit"), ("float, chosen", "original_float", "ours_float"),
+             ("A-buffer, thin", "original_abuffer", "ours_abuffer"), ("binary, tiles", "original_bit", "tiled_bit"),
+             ("float, tiles", "original_float", "tiled_float")]
+    body = []
+    for name, theirs, ours in pairs:
+        ratios = [r[theirs] / r[ours] for r in rows]
+        body.append([name, f"{mean(ratios):.2f} ×", f"{min(ratios):.2f} ×", f"{max(ratios):.2f} ×", str(sum(v < 1 for v in ratios))])
+    return table(["2011 code / ours, one H200", "mean of 15", "least", "greatest", "cells behind"], body)
+
+
+TABLES = {"peers": peers, "paper_scenes": paper_scenes, "paper_binary": paper_binary, "paper_float": paper_float, "paper_abuffer": paper_abuffer,
+          "paper_means": paper_means,
           "times": times, "means": means, "speed": speed, "icosphere": icosphere, "solids": solids, "solid_rules": solid_rules}
 
 
@@ -205,6 +252,9 @@ def main():
         elif fresh != text:
             print(f"error: {name} shows other figures than records/; bench/document_tables.py --update writes them", file=sys.stderr)
             status = 1
+    if paper_figures.digest_of_png(paper_figures.CHART) != paper_figures.digest(paper_figures.rows()):
+        print(f"error: {paper_figures.CHART.name} shows other figures than records/; bench/plot.py --paper --out docs draws it", file=sys.stderr)
+        status = 1
     return status
 
 

@@ -4,8 +4,9 @@
 """Draws the CSV files that the benchmarks write and records/ keeps.
 
     plot.py [--label TEXT] --out FOLDER FILE_OR_FOLDER...
+    plot.py --paper --out docs          the chart of docs/paper.md, from records/h200
 
-A folder stands for every CSV file in it. A file is known by its columns, not by its name:
+A folder stands for every CSV file in it of a known kind. A file is known by its columns, not by its name:
 
     GPU table        ahead.png: times ahead of the fastest published figure
     GPU scaling      scaling_triangles.png, scaling_grid.png, scaling_size.png, scaling_depth.png
@@ -29,6 +30,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  (the backend has to be chosen first)
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter  # noqa: E402
+
+import paper  # noqa: E402
 
 CELL_NAMES = {
     "bit_conservative": "bit, conservative",
@@ -372,14 +375,19 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--label", default="", help="e.g. the device and the commit, for the titles")
     parser.add_argument("--out", type=pathlib.Path, required=True, help="folder for the PNG files")
-    parser.add_argument("inputs", type=pathlib.Path, nargs="+", help="CSV files, or folders of them")
+    parser.add_argument("--paper", action="store_true", help="draw the chart of the paper's scenes")
+    parser.add_argument("inputs", type=pathlib.Path, nargs="*", help="CSV files, or folders of them")
     how = parser.parse_args()
+    if not how.inputs and not how.paper:
+        parser.error("a file, a folder or --paper")
     how.out.mkdir(parents=True, exist_ok=True)
-    drawn = 0
+    drawn = int(how.paper and paper.plot(how.out, how.label))
     for path in [f for given in how.inputs for f in (sorted(given.glob("*.csv")) if given.is_dir() else [given])]:
         rows = read(path)
         plot = next((plot for columns, plot in KINDS if rows and columns <= set(rows[0])), None)
         if plot is None:
+            if path not in how.inputs:
+                continue  # a record of another kind
             sys.exit(f"error: {path} has no rows, or columns of no known kind")
         result = plot(rows, how.label, how.out)
         drawn += 1 if result is None else int(result)

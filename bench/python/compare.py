@@ -13,7 +13,6 @@ error of the volume is that against the mesh's own, in percent.
 """
 import argparse
 import csv
-import importlib.metadata
 import os
 import pathlib
 import platform
@@ -29,17 +28,7 @@ import voxelpipe as vp
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python" / "tests"))
 from meshes import sphere  # noqa: E402
-
-
-def version(package):
-    """The version of an installed package, under whichever of its names; None if there is none."""
-    for name in (package, f"{package}-cpu"):
-        try:
-            return importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            pass
-    return None
-
+from versions import version  # noqa: E402
 
 clock = time.perf_counter
 

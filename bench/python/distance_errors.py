@@ -12,7 +12,6 @@ that sum decides nothing, are left out of the signs. voxelpipe snaps points and 
 A peer that is not installed is left out and named. Versions are printed.
 """
 import argparse
-import importlib.metadata
 import pathlib
 import platform
 import sys
@@ -22,6 +21,7 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python" / "tests"))
 from meshes import box, sphere  # noqa: E402
+from versions import version  # noqa: E402
 
 
 def joined(*parts):
@@ -192,27 +192,13 @@ PEERS = {
 MODULES = {"openvdb": "pyopenvdb", "warp-lang": "warp", "vtk": "vtkmodules"}
 
 
-def version(package):
-    for name in (package, f"{package}-cpu"):
-        try:
-            return importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            pass
-    try:
-        module = __import__(MODULES.get(package, package))
-    except ImportError:
-        return None
-    found = getattr(module, "LIBRARY_VERSION", getattr(module, "__version__", "?"))
-    return ".".join(map(str, found)) if isinstance(found, tuple) else str(found)
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--points", type=int, default=2000, help="of each mesh")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=pathlib.Path, help="the table, also printed")
     options = parser.parse_args()
-    versions = {name: version(name) for name in PEERS}
+    versions = {name: version(name, MODULES.get(name, name)) for name in PEERS}
     lines = [f"{platform.machine()}, Python {platform.python_version()}; " + "; ".join(
         f"{name} {v or 'not installed'}" for name, v in versions.items())]
     lines.append(f"{options.points} points a mesh, seed {options.seed}: wrong signs / largest error of the distance, share of the mesh's size")

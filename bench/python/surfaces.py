@@ -12,7 +12,6 @@ Each time is the least of at least three calls after a first one, or that of one
 and one that refuses an input says so. The table is Markdown, with all versions.
 """
 import argparse
-import importlib.metadata
 import os
 import pathlib
 import platform
@@ -25,6 +24,7 @@ import voxelpipe as vp
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python" / "tests"))
 from meshes import sphere  # noqa: E402
+from versions import version  # noqa: E402
 
 BOX = np.array([[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)])
 SIDES = np.array([[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]])
@@ -177,15 +177,6 @@ PROGRAMS = [  # name, package, function
     ("trimesh voxelized, filled, marching cubes", "trimesh", trimesh_cubes),
     ("manifold3d merge and union", "manifold3d", manifold_of),
 ]
-
-
-def version(package):
-    for name in (package, f"{package}-cpu"):
-        try:
-            return importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            pass
-    return None
 
 
 def timed(call, seconds):

@@ -26,6 +26,8 @@ CPP = {
     "framebuffers": ("Framebuffers and blends", "Render targets, how fragments meet in them, and their copies on the host. "
                      "In the paper: frame-buffer types, multiple render targets, blending modes, programmable ROP.",
                      ["framebuffer.hpp", "blend.hpp", "core/layout.hpp", "core/value_traits.hpp", "core/half.hpp", "host_target.hpp"]),
+    "formats": ("Packed formats", "Vectors in one word as values of targets, and bfloat16: conversions with one rounding, blends, means.",
+                ["formats/normalized.hpp", "formats/packed_floats.hpp", "core/bfloat16.hpp", "formats/packed_blend.hpp"]),
     "abuffers": ("A-buffers", "Every fragment of every voxel. In the paper: A-buffer and bucketing.", ["abuffer.hpp"]),
     "solids": ("Solids", "The inside of meshes.", ["solid/solid.hpp", "solid/diagnose_repair.hpp", "solid/core/crossing.hpp"]),
     "surfaces": ("Surfaces", "Closed manifold meshes of bits, fields and any triangles.",
@@ -59,6 +61,7 @@ TASKS = [
     ("Attributes of vertices", "samples/guide/attributes.cpp", "attributes", "shaders"),
     ("A vertex shader", "samples/guide/attributes.cpp", "vertex shader", "shaders"),
     ("A texture", "samples/guide/attributes.cpp", "texture", "shaders"),
+    ("Colours in one word", "samples/guide/packed_formats.cpp", "packed", "formats"),
     ("A blend of one's own", "samples/guide/blends.cpp", "order-free", "framebuffers"),
     ("Several meshes in one call", "samples/guide/blends.cpp", "draws", "calls"),
     ("Every fragment of a voxel", "samples/guide/grids_and_results.cpp", "find", "abuffers"),

@@ -24,7 +24,8 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tests" / "
 from browser import Browser  # noqa: E402
 
 PAGES = {"index.html": "A file", "gallery/index.html": "first voxels", "api/calls.html": "voxelize_options", "api/tasks.html": "A mesh with holes",
-         "api/python.html": "voxelpipe.bake", "performance.html": "History", "tutorials/volume.html": "centre of mass", "solids.html": "fill rule"}
+         "api/python.html": "voxelpipe.bake", "performance.html": "History", "tutorials/volume.html": "centre of mass", "solids.html": "fill rule",
+         "paper.html": "Schwarz", "api/formats.html": "unorm8x4"}
 # Where all code has to fit its column.
 FITTING = {"index.html", "tutorials/volume.html", "tutorials/scan.html", "tutorials/network.html", "tutorials/colours.html"}
 WIDTHS = {"screen": (1280, 1400), "telephone": (390, 844)}

@@ -23,7 +23,7 @@ PAGES = {
     "docs/guide.md": "guide", "docs/tool.md": "tool", "docs/scale.md": "scale", "docs/solvers.md": "solvers", "docs/c_api.md": "c_api", "python/README.md": "python", "docs/gallery/README.md": "gallery/index",
     "python/tutorials/volume.md": "tutorials/volume", "python/tutorials/colours.md": "tutorials/colours", "python/tutorials/scan.md": "tutorials/scan",
     "python/tutorials/network.md": "tutorials/network",
-    "docs/design.md": "design", "docs/pipeline.md": "pipeline", "docs/performance.md": "performance", "docs/optimizations.md": "optimizations",
+    "docs/design.md": "design", "docs/paper.md": "paper", "docs/pipeline.md": "pipeline", "docs/performance.md": "performance", "docs/optimizations.md": "optimizations",
     "docs/performance_tables.md": "performance_tables",
     "docs/rejected.md": "rejected", "docs/contributing.md": "contributing", "docs/extending.md": "extending", "docs/release.md": "release", "packaging/README.md": "packaging",
     "CHANGELOG.md": "changelog", "README.md": "index",

@@ -52,7 +52,7 @@ struct cone_light {
 // One cone, from `start` voxels away on; it is 2 * spread * t voxels wide at distance t.
 struct cone {
     glm::vec3 from, direction; // of a surface; unit
-    float rise;                // cosine between direction and the surface's normal
+    float rise;                // height over the surface that a sample may use, for each voxel of the way
     float spread, start;
     float narrowest, widest; // voxels that samples are wide at least and at most
 };
@@ -99,13 +99,17 @@ struct cone {
     const glm::vec3 other = normal.y > -0.9f && normal.y < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
     const glm::vec3 c = glm::cross(normal, other);
     const glm::vec3 p = c / vp::exact::sqrt(glm::dot(c, c)), q = glm::cross(p, normal);
+    // A voxel, and a sample of its width, reach farther along a normal that is no axis: by the sum of its components.
+    // With one height for all normals, samples over a wall that is turned meet its steps, in stripes.
+    const float reach = (normal.x < 0.0f ? -normal.x : normal.x) + (normal.y < 0.0f ? -normal.y : normal.y) +
+                        (normal.z < 0.0f ? -normal.z : normal.z);
     cone_light sum;
-    const glm::vec3 from = at + normal * (1.3f * narrowest);
+    const glm::vec3 from = at + normal * (1.3f * narrowest * reach);
     for (int i = phase; i < set.count; i += set.phases) {
         const glm::vec3 d = set.directions[i];
-        const cone_light l = trace_cone(
-            mips, w,
-            {from, p * d.x + q * d.y + normal * d.z, d.z, set.spread, 0.6f * narrowest, narrowest, w.shape.widest});
+        const cone_light l = trace_cone(mips, w,
+                                        {from, p * d.x + q * d.y + normal * d.z, d.z / reach, set.spread,
+                                         0.6f * narrowest, narrowest, w.shape.widest});
         sum.light = sum.light + l.light;
         sum.occlusion = sum.occlusion + l.occlusion;
     }
