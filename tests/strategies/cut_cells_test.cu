@@ -39,8 +39,7 @@ struct everything_measured {
     using fragment = vp::measured_cell<vp::cell_value::centroid, vp::cell_value::area, vp::cell_value::sheets>;
     VOXELPIPE_HD auto operator()(const fragment& f) const {
         return vp::outputs(f.centroid.x, f.centroid.y, f.centroid.z, f.area, f.area_centroid.x, f.area_centroid.y,
-                           f.area_centroid.z, static_cast<std::uint32_t>(f.is_multi_cut ? 2 : 0) + (f.is_cut ? 1 : 0),
-                           f.fraction);
+                           f.area_centroid.z, static_cast<std::uint32_t>(f.is_multi_cut ? 2 : 0) + (f.is_cut ? 1 : 0));
     }
 };
 template <class T>
@@ -48,7 +47,7 @@ using replaced = vp::target<T, vp::blend::replace>;
 template <class Backend>
 using measured_target =
     vp::framebuffer<Backend, replaced<float>, replaced<float>, replaced<float>, replaced<double>, replaced<float>,
-                    replaced<float>, replaced<float>, vp::target<std::uint32_t, vp::blend::bit_xor>, replaced<float>>;
+                    replaced<float>, replaced<float>, vp::target<std::uint32_t, vp::blend::bit_xor>>;
 template <class Backend>
 using one_target = vp::framebuffer<Backend, vp::target<float, vp::blend::replace>>;
 
