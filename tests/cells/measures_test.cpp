@@ -209,6 +209,31 @@ TEST(CellMeasures, SheetsAreJoinedByEdgesWithinTheVoxel) {
     EXPECT_EQ(measure(soup, g).at({1, 1, 1})[7], 1.0);
 }
 
+// snippet: measured_cell
+// A wall's area and its place, and where the part inside has its middle.
+struct wall_and_middle {
+    using fragment = vp::measured_cell<vp::cell_value::centroid, vp::cell_value::area>;
+    VOXELPIPE_HD auto operator()(const fragment& f) const {
+        return vp::outputs(f.fraction, static_cast<float>(f.area), f.centroid.x, f.area_centroid.x);
+    }
+};
+// end snippet
+
+// Targets of a framebuffer hold what a shader asks for.
+TEST(CellMeasures, AreDrawnIntoTargets) {
+    const mesh m = solids::box({0.25f, 0, 0}, {2, 1, 1});
+    vp::cpu_backend backend(1);
+    using number = vp::target<float, vp::blend::replace>;
+    vp::framebuffer<vp::cpu_backend, number, number, number, number> fb(backend, {2, 1, 1});
+    vp::voxelize_cells(backend, m.view(), solids::unit_grid({2, 1, 1}), vp::passthrough{}, wall_and_middle{}, fb)
+        .or_throw();
+    EXPECT_EQ((vp::get<0>(fb).to_host(backend)), (std::vector<float>{0.75f, 1}));
+    // The sides at y = 0 and z = 0 belong to the voxels below, which are not in the grid.
+    EXPECT_EQ((vp::get<1>(fb).to_host(backend)), (std::vector<float>{2.5f, 3}));
+    EXPECT_EQ((vp::get<2>(fb).to_host(backend)), (std::vector<float>{0.125f, 0}));
+    EXPECT_EQ((vp::get<3>(fb).to_host(backend)), (std::vector<float>{-0.025f, 1.0f / 6}));
+}
+
 // What is not asked for is not there: the fraction alone has the numbers that it has with all else.
 TEST(CellMeasures, DoNotChangeFractions) {
     splitmix64 random(43);
