@@ -53,8 +53,8 @@ template <cell_value>
 struct value_of_cell;
 template <>
 struct value_of_cell<cell_value::centroid> {
-    // Of the part inside: from the voxel's centre, in voxels, -0.5 to 0.5. 0 where the fraction is less than 2^-20 or
-    // the quotient lies more than 2^-10 beyond the voxel, as overlapping and inverted parts can have it.
+    // The middle of the part inside: from the voxel's centre, in voxels, -0.5 to 0.5. 0 where the fraction is less than
+    // 2^-20 or the quotient lies more than 2^-10 beyond the voxel, as overlapping and inverted parts can have it.
     glm::vec3 centroid;
 };
 template <>
