@@ -114,18 +114,19 @@ def fractions(
     out: dict[str, np.ndarray] = {"fraction": np.empty((len(firsts), *grid.shape), np.float32)}
     if has_areas:
         out["area_vector"] = np.zeros((len(firsts), *grid.shape, 3))
-    for axis, name in enumerate(_APERTURES):
-        if name in wanted:
+    for axis, faces in enumerate(_APERTURES):
+        if faces in wanted:
             shape = list(grid.shape)
             shape[2 - axis] += 1
-            out[name] = np.zeros((len(firsts), *shape))
-    for name, (scalar, tail) in _WITHIN.items():
-        if name in wanted:
-            out[name] = np.zeros((len(firsts), *grid.shape, *tail), scalar)
+            out[faces] = np.zeros((len(firsts), *shape))
+    for part, (scalar, tail) in _WITHIN.items():
+        if part in wanted:
+            out[part] = np.zeros((len(firsts), *grid.shape, *tail), scalar)
     counts: dict[str, int] = {}
     open_rows = rows = 0
     for body, (first, end) in enumerate(zip(firsts, ends)):
         for axis in axes:
+            within = [out[part][body] if part in out and axis == 0 else None for part in _WITHIN]
             of_body = _core.fractions(
                 positions,
                 m.triangles[first:end],
@@ -134,7 +135,10 @@ def fractions(
                 out["fraction"][body],
                 out[_APERTURES[axis]][body] if _APERTURES[axis] in out else None,
                 out["area_vector"][body] if has_areas else None,
-                *(out[name][body] if name in out and axis == 0 else None for name in _WITHIN),
+                within[0],
+                within[1],
+                within[2],
+                within[3],
                 threads,
             )
             open_rows += of_body["open_rows"]
