@@ -145,14 +145,15 @@ struct surface_counters {
 // What voxelize_cells counts besides `counters`; zeros from other calls. Volumes are multiples of 2^-44 of a voxel.
 struct cell_counters {
     // The sum of the fractions of the call's voxels, of all bodies, is a signed number of 128 bits.
-    std::uint64_t volume_low = 0;   // its lower 64 bits
-    std::int64_t volume_high = 0;   // its upper 64 bits
-    std::uint64_t cut_voxels = 0;   // voxels that a triangle's inside reaches; with bodies::draw once a draw
-    std::uint64_t below_zero = 0;   // fractions below -2^-24
-    std::uint64_t above_one = 0;    // fractions above 1 + 2^-24
-    std::uint64_t open_rows = 0;    // rows along the axis whose covers do not sum to 0
-    std::uint64_t open_edges = 0;   // snapped edges that no opposite edge cancels; 0 if they were not counted
-    std::uint64_t cell_records = 0; // parts of triangles in voxels, before and behind the grid
+    std::uint64_t volume_low = 0;     // its lower 64 bits
+    std::int64_t volume_high = 0;     // its upper 64 bits
+    std::uint64_t cut_voxels = 0;     // voxels that a triangle's inside reaches; with bodies::draw once a draw
+    std::uint64_t below_zero = 0;     // fractions below -2^-24
+    std::uint64_t above_one = 0;      // fractions above 1 + 2^-24
+    std::uint64_t open_rows = 0;      // rows along the axis whose covers do not sum to 0
+    std::uint64_t open_edges = 0;     // snapped edges that no opposite edge cancels; 0 if they were not counted
+    std::uint64_t cell_records = 0;   // parts of triangles in voxels, before and behind the grid
+    std::uint64_t lost_centroids = 0; // with cell_value::centroid: fragments that have the voxel's centre instead
 
     // The volume in voxels, rounded to double.
     [[nodiscard]] double volume() const {

@@ -53,11 +53,58 @@ struct fraction_and_faces {
     }
 };
 
+// Arrays of what is measured within a voxel, null where nobody asked.
+struct inner_arrays {
+    float* centroids = nullptr; // three a voxel
+    double* areas = nullptr;
+    float* area_centroids = nullptr; // three a voxel
+    bool* multi_cuts = nullptr;
+
+    [[nodiscard]] bool any() const {
+        return centroids != nullptr || areas != nullptr || area_centroids != nullptr || multi_cuts != nullptr;
+    }
+};
+
+// The same shader with what is measured within the voxel.
+struct measuring : fraction_and_faces {
+    using fragment = measured_cell<cell_value::centroid, cell_value::area, cell_value::sheets>;
+    inner_arrays inner;
+
+    output<float> operator()(const fragment& f) const {
+        const glm::ivec3 p = f.voxel - to.offset;
+        const std::int64_t voxel = (static_cast<std::int64_t>(p.z) * to.extent.y + p.y) * to.extent.x + p.x;
+        for (int i = 0; i < 3; ++i) {
+            if (inner.centroids != nullptr) inner.centroids[3 * voxel + i] = f.centroid[i];
+            if (inner.area_centroids != nullptr) inner.area_centroids[3 * voxel + i] = f.area_centroid[i];
+        }
+        if (inner.areas != nullptr) inner.areas[voxel] = f.area;
+        if (inner.multi_cuts != nullptr) inner.multi_cuts[voxel] = f.is_multi_cut;
+        return fraction_and_faces::operator()(f);
+    }
+};
+
+template <class Shader>
+status draw_cells(const position_array& positions, const triangle_array& triangles, const grid& g, int axis, float* out,
+                  const Shader& shader, unsigned threads) {
+    using cell_draw = draw<mesh_view<>, passthrough, Shader>;
+    const auto draws = draws_of_parts<cell_draw>(view_of(positions, triangles), std::vector<std::uint64_t>{0}, shader);
+    cell_options options;
+    options.axis = axis;
+    const nb::gil_scoped_release released;
+    cpu_backend backend{threads};
+    return voxelize_cells(backend, draws, g, framebuffer_view<target<float, blend::replace>>::on(g.extent, out),
+                          options);
+}
+
 // Fractions of all triangles together, into an array of the grid's shape, by rows along an axis; and of the voxels'
-// faces across that axis their fractions inside, and the component of the mesh's area vector, into arrays of zeros.
+// faces across that axis their fractions inside, and the component of the mesh's area vector, into arrays of zeros; and
+// what is measured within voxels.
 nb::dict fractions_of(const position_array& positions, const triangle_array& triangles, const grid& g, int axis,
                       const array<float, 3>& out, const std::optional<array<double, 3>>& apertures,
-                      const std::optional<array<double, 4>>& areas, unsigned threads) {
+                      const std::optional<array<double, 4>>& areas, const std::optional<array<float, 4>>& centroids,
+                      const std::optional<array<double, 3>>& sizes,
+                      const std::optional<array<float, 4>>& area_centroids,
+                      const std::optional<array<bool, 3>>& multi_cuts, unsigned threads) {
     expect_shape(out, g, "the result");
     fraction_and_faces shader{{nullptr, nullptr, 1, g.extent, g.offset, axis}};
     if (apertures) {
@@ -71,23 +118,33 @@ nb::dict fractions_of(const position_array& positions, const triangle_array& tri
         shader.to.areas = areas->data();
         shader.to.face = g.voxel_size[(axis + 1) % 3] * g.voxel_size[(axis + 2) % 3];
     }
-    using cell_draw = draw<mesh_view<>, passthrough, fraction_and_faces>;
-    const auto draws = draws_of_parts<cell_draw>(view_of(positions, triangles), std::vector<std::uint64_t>{0}, shader);
-    cell_options options;
-    options.axis = axis;
-    status s;
-    {
-        const nb::gil_scoped_release released;
-        cpu_backend backend{threads};
-        s = voxelize_cells(backend, draws, g, framebuffer_view<target<float, blend::replace>>::on(g.extent, out.data()),
-                           options);
+    inner_arrays inner;
+    if (centroids) {
+        expect_shape(*centroids, g, "the array of centroids", {3});
+        inner.centroids = centroids->data();
     }
+    if (sizes) {
+        expect_shape(*sizes, g, "the array of areas");
+        inner.areas = sizes->data();
+    }
+    if (area_centroids) {
+        expect_shape(*area_centroids, g, "the array of the areas' centroids", {3});
+        inner.area_centroids = area_centroids->data();
+    }
+    if (multi_cuts) {
+        expect_shape(*multi_cuts, g, "the array of marks");
+        inner.multi_cuts = multi_cuts->data();
+    }
+    const status s = inner.any()
+                         ? draw_cells(positions, triangles, g, axis, out.data(), measuring{shader, inner}, threads)
+                         : draw_cells(positions, triangles, g, axis, out.data(), shader, threads);
     nb::dict d = report(s);
     d["cut_voxels"] = s.cells.cut_voxels;
     d["below_zero"] = s.cells.below_zero;
     d["above_one"] = s.cells.above_one;
     d["open_rows"] = s.cells.open_rows;
     d["open_edges"] = s.cells.open_edges;
+    d["lost_centroids"] = s.cells.lost_centroids;
     return d;
 }
 
@@ -95,7 +152,8 @@ nb::dict fractions_of(const position_array& positions, const triangle_array& tri
 
 void bind_fractions(nb::module_& m) {
     m.def("fractions", &fractions_of, nb::arg("positions"), nb::arg("triangles"), nb::arg("grid"), nb::arg("axis"),
-          nb::arg("out"), nb::arg("apertures").none(), nb::arg("areas").none(), nb::arg("threads"));
+          nb::arg("out"), nb::arg("apertures").none(), nb::arg("areas").none(), nb::arg("centroids").none(),
+          nb::arg("sizes").none(), nb::arg("area_centroids").none(), nb::arg("multi_cuts").none(), nb::arg("threads"));
 }
 
 } // namespace voxelpipe::python

@@ -117,6 +117,42 @@ def test_area_of_a_sphere():
     assert 0.99 * area < found <= area * (1 + 1e-6)  # a curved part counts as its chord
 
 
+def test_centroids_and_areas_of_a_box_are_those_of_its_overlaps():
+    low, high, status = np.array((0.625, 0.375, 1)), np.array((3.875, 3.0625, 6.5)), {}
+    names = ["multi_cut", "centroid", "area", "area_centroid"]
+    cells = vp.fractions(box(low, high), GRID, of=names, status=status)
+    assert list(cells) == names and not cells["multi_cut"].any()
+    assert status["lost_centroids"] == 7 * 12  # of voxels with nothing but the side at z = 1, their upper face
+    shape = (*GRID.shape, 3)
+    assert cells["centroid"].dtype == cells["area_centroid"].dtype == np.float32
+    assert cells["area"].dtype == np.float64 and cells["multi_cut"].dtype == np.bool_
+    assert cells["centroid"].shape == cells["area_centroid"].shape == shape and cells["area"].shape == GRID.shape
+    at = np.stack(np.meshgrid(*(np.arange(n) for n in GRID.shape), indexing="ij"), -1)[..., ::-1]
+    first = np.array(GRID.origin) + at * GRID.voxel_size
+    start, end = np.maximum(first, low), np.minimum(first + GRID.voxel_size, high)
+    has_part = (start < end).all(-1)
+    middle = ((start + end) / 2 - first) / GRID.voxel_size - 0.5
+    assert np.abs(cells["centroid"] - middle)[has_part].max() < 1e-6 and not cells["centroid"][~has_part].any()
+    size = high - low
+    assert cells["area"].sum() == pytest.approx(2 * (size * np.roll(size, 1)).sum(), rel=1e-12)
+    weighted = (cells["area"][..., None] * (first + (cells["area_centroid"] + 0.5) * GRID.voxel_size)).sum((0, 1, 2))
+    assert weighted / cells["area"].sum() == pytest.approx((low + high) / 2, rel=1e-6)
+    # The side at z = 1, a plane between voxels, is the lower voxels'.
+    assert (cells["area"][0] > 0).any() and np.abs(cells["area_centroid"][0][cells["area"][0] > 0][:, 2] - 0.5).max() < 1e-6
+
+
+def test_marks_of_voxels_with_two_sheets_and_bodies_apart():
+    plate = vp.fractions(box((0.25, 0.125, 2.25), (4.25, 4.875, 2.75)), GRID, of="multi_cut")
+    assert plate[2, 1:-1, 1:-1].all() and plate.sum() == plate[2, 1:-1, 1:-1].size
+    a, b = box((0.5, 0.25, 1.25), (3.25, 3, 1.5)), box((0.5, 0.25, 1.75), (3.25, 3, 5))
+    together = vp.fractions([a, b], GRID, of=("multi_cut", "area", "centroid"))
+    each = vp.fractions([a, b], GRID, of=("multi_cut", "area", "centroid"), bodies="each")
+    assert np.allclose(together["area"], each["area"].sum(0), rtol=1e-12) and each["centroid"].shape == (2, *GRID.shape, 3)
+    assert (together["multi_cut"] & ~each["multi_cut"].any(0)).any()  # a sheet of each
+    for threads in (1, 2):
+        assert np.array_equal(vp.fractions([a, b], GRID, of="centroid", threads=threads), together["centroid"])
+
+
 def test_open_meshes_warn_and_mistakes_are_named():
     vertices, triangles = box((1, 1, 1), (3, 3, 3))
     with pytest.warns(vp.OpenMeshWarning, match="rows of voxels do not balance"):
@@ -124,7 +160,7 @@ def test_open_meshes_warn_and_mistakes_are_named():
     with pytest.warns(vp.OpenMeshWarning, match=r" of 406 rows"):  # along x and y
         vp.fractions((vertices, np.delete(triangles, 8, axis=0)), GRID, of=("aperture_y",), status=(status := {}))
     assert status["open_rows"] > 0
-    for mistake in ("area", ("fraction", "aperture"), ()):
+    for mistake in ("areas", ("fraction", "aperture"), ()):
         with pytest.raises(ValueError, match="of "):
             vp.fractions((vertices, triangles), GRID, of=mistake)
     with pytest.raises(ValueError, match="bodies"):

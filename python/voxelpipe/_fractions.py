@@ -15,6 +15,13 @@ from ._surface import take_counts
 from ._types import Bodies, CellValue, MeshLike, check_call, check_choice
 
 _APERTURES = ("aperture_x", "aperture_y", "aperture_z")
+# What is measured within a voxel, in the order of the call: the type and the shape of a voxel's values.
+_WITHIN: dict[str, tuple[Any, tuple[int, ...]]] = {
+    "centroid": (np.float32, (3,)),
+    "area": (np.float64, ()),
+    "area_centroid": (np.float32, (3,)),
+    "multi_cut": (np.bool_, ()),
+}
 
 
 @overload
@@ -66,13 +73,19 @@ def fractions(
             "area_vector": float64, (nz, ny, nx, 3), the sum of the vectors (x, y, z) of the mesh's area within the voxel,
             outward, in world units. For voxels of size 1 it is the difference of the voxel's two apertures along each axis,
             to the last bit; area between two voxels is the lower one's.
+            "centroid": float32, (nz, ny, nx, 3), the centroid (x, y, z) of the part inside, from the voxel's centre in
+            voxels, -0.5 to 0.5. 0 where the fraction is less than 2^-20, or overlapping parts put it out of the voxel.
+            "area", "area_centroid": float64, (nz, ny, nx), the area of all triangles' parts in the voxel in squared units
+            of the world, and float32, (nz, ny, nx, 3), its centroid, given as that of the part inside.
+            "multi_cut": bool, (nz, ny, nx), where more than one sheet of the surface cuts the voxel: triangles are of one
+            sheet where edges join them that meet the voxel.
         bodies: "all", the sum over all bodies; "each", arrays with one more axis in front, (n, nz, ny, nx), of every body by
             itself, for materials that share a voxel.
         threads: 0 takes all cores. The result is the same for any number.
         status: a dict that is filled with the call's counters, those of rows along x, with "each" their sums over the
             bodies: cut_voxels that a triangle's inside reaches; below_zero and above_one, voxels that are below 0 or above 1
-            by more than 2^-24; open_edges without an opposite edge; and open_rows, rows of voxels along every axis that was
-            asked for whose triangles do not balance.
+            by more than 2^-24; open_edges without an opposite edge; open_rows, rows of voxels along every axis that was
+            asked for whose triangles do not balance; and lost_centroids, voxels that have their centre instead.
 
     Returns the values; a mesh of torch's tensors gives tensors. Warns with OpenMeshWarning where rows prove that the mesh
     is not closed. Raises IndexError for a triangle that names a vertex that does not exist, TypeError for a mesh in a GPU's
@@ -101,15 +114,19 @@ def fractions(
     out: dict[str, np.ndarray] = {"fraction": np.empty((len(firsts), *grid.shape), np.float32)}
     if has_areas:
         out["area_vector"] = np.zeros((len(firsts), *grid.shape, 3))
-    for axis, name in enumerate(_APERTURES):
-        if name in wanted:
+    for axis, faces in enumerate(_APERTURES):
+        if faces in wanted:
             shape = list(grid.shape)
             shape[2 - axis] += 1
-            out[name] = np.zeros((len(firsts), *shape))
+            out[faces] = np.zeros((len(firsts), *shape))
+    for part, (scalar, tail) in _WITHIN.items():
+        if part in wanted:
+            out[part] = np.zeros((len(firsts), *grid.shape, *tail), scalar)
     counts: dict[str, int] = {}
     open_rows = rows = 0
     for body, (first, end) in enumerate(zip(firsts, ends)):
         for axis in axes:
+            within = [out[part][body] if part in out and axis == 0 else None for part in _WITHIN]
             of_body = _core.fractions(
                 positions,
                 m.triangles[first:end],
@@ -118,6 +135,10 @@ def fractions(
                 out["fraction"][body],
                 out[_APERTURES[axis]][body] if _APERTURES[axis] in out else None,
                 out["area_vector"][body] if has_areas else None,
+                within[0],
+                within[1],
+                within[2],
+                within[3],
                 threads,
             )
             open_rows += of_body["open_rows"]

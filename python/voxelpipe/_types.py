@@ -20,7 +20,17 @@ Extent = Literal["outer", "centre", "center", "inner"]
 Repair = Literal["none", "close_holes", "exterior", "vote"]
 Bodies = Literal["all", "each"]
 # What fractions() measures of every voxel.
-CellValue = Literal["fraction", "area_vector", "aperture_x", "aperture_y", "aperture_z"]
+CellValue = Literal[
+    "fraction",
+    "area_vector",
+    "aperture_x",
+    "aperture_y",
+    "aperture_z",
+    "centroid",
+    "area",
+    "area_centroid",
+    "multi_cut",
+]
 Place = Literal["corner", "mean", "sharp"]
 Border = Literal["closed", "open"]
 Blend = Literal["mean", "sum", "min", "max", "last"]

@@ -15,24 +15,43 @@ using namespace cells;
 using oracle::lattice_point;
 using oracle::lattice_triangle;
 using place = std::array<std::int64_t, 3>;
-using term_map = std::map<place, vp::core::cell_terms>;
+using all_terms = vp::core::terms_of_needs<vp::core::needs_centroid | vp::core::needs_area>;
+using term_map = std::map<place, all_terms>;
+constexpr vp::core::cell_areas cubes{{1.0, 1.0, 1.0}, 1.0};
 
 vp::core::snapped_position to_position(const lattice_point& p) { return {p[0], p[1], p[2]}; }
 
 // Adds a triangle's terms to those of its voxels. Voxels -1 and `extent` stand for all before and behind.
 template <class Int>
 void add_terms(const lattice_triangle& t, int fraction, std::int64_t extent, term_map& sums) {
-    const auto tri =
-        vp::core::make_cell_triangle<Int>(to_position(t[0]), to_position(t[1]), to_position(t[2]), fraction);
+    auto tri = vp::core::make_cell_triangle<Int>(to_position(t[0]), to_position(t[1]), to_position(t[2]), fraction);
+    vp::core::lift(tri);
     const std::int64_t extents[3] = {extent, extent, extent};
     const vp::core::cell_box box = vp::core::make_cell_box(tri, extents);
-    vp::core::for_each_cell<false>(
-        tri, box, [&](std::int64_t y, std::int64_t z, std::int64_t x, const vp::core::cell_terms& terms) {
-            auto& sum = sums[{z - box.lo[2], y - box.lo[1], x - box.lo[0]}];
+    vp::core::for_each_cell<false, all_terms>(
+        tri, box,
+        [&](std::int64_t y, std::int64_t z, std::int64_t x, const all_terms& terms) {
+            all_terms& sum = sums[{z - box.lo[2], y - box.lo[1], x - box.lo[0]}];
             sum.cover += terms.cover;
             sum.volume += terms.volume;
-        });
+            sum.cover_y += terms.cover_y;
+            sum.cover_z += terms.cover_z;
+            sum.volume_x += terms.volume_x;
+            sum.volume_y += terms.volume_y;
+            sum.volume_z += terms.volume_z;
+            sum.area += terms.area;
+            sum.area_x += terms.area_x;
+            sum.area_y += terms.area_y;
+            sum.area_z += terms.area_z;
+        },
+        vp::core::ratio_of(tri, cubes));
 }
+
+// All numbers of terms: those that change sign with the triangle, then areas.
+std::array<std::int64_t, 7> signed_terms(const all_terms& t) {
+    return {t.cover, t.volume, t.cover_y, t.cover_z, t.volume_x, t.volume_y, t.volume_z};
+}
+std::array<std::int64_t, 4> unsigned_terms(const all_terms& t) { return {t.area, t.area_x, t.area_y, t.area_z}; }
 
 std::vector<lattice_triangle> tetrahedron(const std::array<lattice_point, 4>& p) {
     return {{p[0], p[2], p[1]}, {p[0], p[1], p[3]}, {p[0], p[3], p[2]}, {p[1], p[2], p[3]}};
@@ -96,37 +115,60 @@ void check_mesh(const std::vector<lattice_triangle>& mesh, int fraction, std::in
     if (has_narrow) {
         ASSERT_EQ(wide.size(), narrow.size());
         for (const auto& [at, terms] : wide) {
-            ASSERT_EQ(narrow.at(at).cover, terms.cover);
-            ASSERT_EQ(narrow.at(at).volume, terms.volume);
+            ASSERT_EQ(signed_terms(narrow.at(at)), signed_terms(terms));
+            ASSERT_EQ(unsigned_terms(narrow.at(at)), unsigned_terms(terms));
         }
     }
     for (std::int64_t z = 0; z < extent; ++z)
         for (std::int64_t y = 0; y < extent; ++y) {
-            std::int64_t aperture = 0;
+            std::int64_t aperture = 0, row_y = 0, row_z = 0;
             for (std::int64_t x = -1; x <= extent; ++x) {
                 const auto found = wide.find({z, y, x});
-                const vp::core::cell_terms terms = found == wide.end() ? vp::core::cell_terms{0, 0} : found->second;
+                const all_terms terms = found == wide.end() ? all_terms{} : found->second;
                 if (x >= 0 && x < extent) {
-                    long double exact = 0.0L;
+                    long double exact = 0.0L, area = 0.0L;
+                    std::array<long double, 3> moment{}, area_moment{};
                     bool touches = false;
                     for (const lattice_triangle& t : mesh) {
                         const oracle::cell_part part = oracle::cell_of(
                             t, fraction, {static_cast<int>(x), static_cast<int>(y), static_cast<int>(z)});
                         exact += part.fraction;
                         touches = touches || part.touches;
+                        area += part.area;
+                        for (std::size_t i = 0; i < 3; ++i) {
+                            moment[i] += part.moment[i];
+                            area_moment[i] += part.area_moment[i];
+                        }
                     }
                     const std::int64_t units = aperture + terms.volume;
                     const long double error = std::abs(static_cast<long double>(units) - std::ldexp(exact, 44));
                     ASSERT_LE(error, bound * static_cast<double>(mesh.size())) << x << ' ' << y << ' ' << z;
+                    const std::array<std::int64_t, 3> found_moment{terms.volume_x, row_y + terms.volume_y,
+                                                                   row_z + terms.volume_z},
+                        found_area_moment{terms.area_x, terms.area_y, terms.area_z};
+                    const auto off = [](std::int64_t is, long double should, int bits) {
+                        return std::abs(static_cast<long double>(is) - std::ldexp(should, bits));
+                    };
+                    const double count = static_cast<double>(mesh.size());
+                    ASSERT_LE(off(terms.area, area, 40), 0.51 * count) << x << ' ' << y << ' ' << z;
+                    for (std::size_t i = 0; i < 3; ++i) {
+                        ASSERT_LE(off(found_moment[i], moment[i], 44), bound * count) << x << ' ' << y << ' ' << z;
+                        ASSERT_LE(off(found_area_moment[i], area_moment[i], 40), 0.51 * count);
+                    }
                     if (!touches) {
                         ++untouched;
+                        ASSERT_EQ(found_moment, (std::array<std::int64_t, 3>{})) << x << ' ' << y << ' ' << z;
                         ASSERT_EQ(units, std::llrint(exact) * whole_cell) << x << ' ' << y << ' ' << z;
                         ASSERT_TRUE(found == wide.end());
                     }
                 }
                 aperture += terms.cover;
+                row_y += terms.cover_y;
+                row_z += terms.cover_z;
             }
             ASSERT_EQ(aperture, 0) << y << ' ' << z;
+            ASSERT_EQ(row_y, 0) << y << ' ' << z;
+            ASSERT_EQ(row_z, 0) << y << ' ' << z;
         }
 }
 
@@ -163,12 +205,14 @@ TEST(CellTerms, DoNotDependOnTheFirstVertexOrOnWholeVoxels) {
         ASSERT_EQ(one.size(), turned.size());
         ASSERT_EQ(one.size(), moved.size());
         for (const auto& [at, terms] : one) {
-            EXPECT_EQ(turned.at(at).cover, terms.cover);
-            EXPECT_EQ(turned.at(at).volume, terms.volume);
-            EXPECT_EQ(over.at(at).cover, -terms.cover);
-            EXPECT_EQ(over.at(at).volume, -terms.volume);
-            EXPECT_EQ(moved.at({at[0] + 3, at[1] + 3, at[2] + 3}).cover, terms.cover);
-            EXPECT_EQ(moved.at({at[0] + 3, at[1] + 3, at[2] + 3}).volume, terms.volume);
+            const all_terms& there = moved.at({at[0] + 3, at[1] + 3, at[2] + 3});
+            auto opposite = signed_terms(terms);
+            for (std::int64_t& term : opposite) term = -term;
+            EXPECT_EQ(signed_terms(turned.at(at)), signed_terms(terms));
+            EXPECT_EQ(signed_terms(over.at(at)), opposite);
+            EXPECT_EQ(signed_terms(there), signed_terms(terms));
+            for (const all_terms& t2 : {turned.at(at), over.at(at), there})
+                EXPECT_EQ(unsigned_terms(t2), unsigned_terms(terms));
         }
     }
 }

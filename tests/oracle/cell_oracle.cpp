@@ -84,6 +84,29 @@ long double integrate(const polygon& p, const half_plane* function) {
     return sum;
 }
 
+// The integral of the product of two linear functions.
+long double integrate(const polygon& p, const half_plane& f, const half_plane& g) {
+    long double sum = 0.0L;
+    for (std::size_t i = 1; i + 1 < p.corners.size(); ++i) {
+        const corner &o = p.corners[0], &q = p.corners[i], &r = p.corners[i + 1];
+        const auto minus = [&](const corner& c, int128 of_c, int128 of_o) {
+            return wide(of_c) * wide(o.w) - wide(of_o) * wide(c.w);
+        };
+        const wide twice = minus(q, q.s, o.s) * minus(r, r.t, o.t) - minus(q, q.t, o.t) * minus(r, r.s, o.s);
+        const long double area = to_real(twice) / to_real(wide(2) * wide(o.w) * wide(o.w) * wide(q.w) * wide(r.w));
+        // At the corners, with one denominator, which is w.
+        const wide w = wide(o.w) * wide(q.w) * wide(r.w);
+        const auto values = [&](const half_plane& h) {
+            return std::array<wide, 3>{wide(at(h, o)) * wide(q.w) * wide(r.w), wide(at(h, q)) * wide(o.w) * wide(r.w),
+                                       wide(at(h, r)) * wide(o.w) * wide(q.w)};
+        };
+        const auto a = values(f), b = values(g);
+        const wide total = (a[0] + a[1] + a[2]) * (b[0] + b[1] + b[2]) + a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        sum += area / 12.0L * to_real(total) / (to_real(w) * to_real(w));
+    }
+    return sum;
+}
+
 } // namespace
 
 cell_part cell_of(const lattice_triangle& t, int fraction_bits, const std::array<int, 3>& voxel) {
@@ -111,6 +134,41 @@ cell_part cell_of(const lattice_triangle& t, int fraction_bits, const std::array
     part.fraction = part.cover;
     if (!is_flat) part.fraction += scale * std::ldexp(integrate(within, &below_upper), -fraction_bits);
     part.touches = !within.corners.empty();
+
+    const auto from_centre = [&](int axis) { // twice
+        half_plane h = side(axis, voxel[static_cast<std::size_t>(axis)] * size, 1);
+        return half_plane{2 * h.a, 2 * h.b, 2 * h.c - size};
+    };
+    for (int axis = 1; axis < 3; ++axis) {
+        const half_plane h = from_centre(axis);
+        long double& m = part.moment[static_cast<std::size_t>(axis)];
+        m = scale * std::ldexp(integrate(below, &h), -fraction_bits - 1);
+        if (!is_flat) m += scale * std::ldexp(integrate(within, h, below_upper), -2 * fraction_bits - 1);
+    }
+    // Of t (1 - t) / 2, where t is the distance from the lower face.
+    if (!is_flat)
+        part.moment[0] = scale * std::ldexp(integrate(within, above_lower, below_upper), -2 * fraction_bits - 1);
+
+    for (int axis = 0; axis < 3; ++axis) {
+        bool is_in_lower = true;
+        for (const corner& c : within.corners)
+            is_in_lower = is_in_lower && at(side(axis, voxel[static_cast<std::size_t>(axis)] * size, 1), c) == 0;
+        if (is_in_lower) return part;
+    }
+    long double squares = 0.0L;
+    for (std::size_t i = 0; i < 3; ++i) {
+        const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
+        const auto n = static_cast<long double>((t[1][j] - t[0][j]) * (t[2][k] - t[0][k]) -
+                                                (t[1][k] - t[0][k]) * (t[2][j] - t[0][j]));
+        squares += n * n;
+    }
+    const long double twice = std::ldexp(std::sqrt(squares), -2 * fraction_bits); // the triangle's area
+    part.area = twice * integrate(within, nullptr);
+    for (int axis = 0; axis < 3; ++axis) {
+        const half_plane h = from_centre(axis);
+        part.area_moment[static_cast<std::size_t>(axis)] =
+            twice * std::ldexp(integrate(within, &h), -fraction_bits - 1);
+    }
     return part;
 }
 

@@ -17,6 +17,11 @@ struct cell_part {
     long double fraction; // winding number, integrated over the voxel: of rows along x, positive where n_x < 0
     long double cover;    // of the pixel by the part at x below the voxel: likewise
     bool touches;         // the closed triangle meets the closed voxel
+    std::array<long double, 3> moment; // of the winding number, about the voxel's centre
+    // Of the part in the voxel, in faces of a voxel, and its moment about the centre; parts in a plane between two
+    // voxels belong to the lower one.
+    long double area;
+    std::array<long double, 3> area_moment;
 };
 
 // Positions in units of 2^-fraction_bits voxel, |coordinates| < 2^20.

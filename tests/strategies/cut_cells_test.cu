@@ -34,6 +34,20 @@ using every_target =
     vp::framebuffer<Backend, vp::target<float, vp::blend::add>, vp::target<std::int64_t, vp::blend::replace>,
                     vp::target<std::int64_t, vp::blend::max>, vp::target<std::int64_t, vp::blend::min>,
                     vp::target<vp::bit, vp::blend::bit_or>>;
+// All that a shader can ask for.
+struct everything_measured {
+    using fragment = vp::measured_cell<vp::cell_value::centroid, vp::cell_value::area, vp::cell_value::sheets>;
+    VOXELPIPE_HD auto operator()(const fragment& f) const {
+        return vp::outputs(f.centroid.x, f.centroid.y, f.centroid.z, f.area, f.area_centroid.x, f.area_centroid.y,
+                           f.area_centroid.z, static_cast<std::uint32_t>(f.is_multi_cut ? 2 : 0) + (f.is_cut ? 1 : 0));
+    }
+};
+template <class T>
+using replaced = vp::target<T, vp::blend::replace>;
+template <class Backend>
+using measured_target =
+    vp::framebuffer<Backend, replaced<float>, replaced<float>, replaced<float>, replaced<double>, replaced<float>,
+                    replaced<float>, replaced<float>, vp::target<std::uint32_t, vp::blend::bit_xor>>;
 template <class Backend>
 using one_target = vp::framebuffer<Backend, vp::target<float, vp::blend::replace>>;
 
@@ -92,6 +106,20 @@ TEST(DeviceCells, BodiesAndPartsOfGridsHaveTheBytesOfTheCpu) {
     for (const vp::bodies b : {vp::bodies::call, vp::bodies::draw})
         for (const vp::grid& g : {device_test::box_grid(extent), flat, flat.crop({5, 3, 2}, {29, 14, 31})})
             expect_same<every_target>(meshes, g, everything{1}, {.bodies = b, .axis = b == vp::bodies::draw ? 1 : 0});
+}
+
+// Centroids, areas and sheets, of flat sides in the lattice's planes too.
+TEST(DeviceCells, MeasuresHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{25, 21, 24};
+    mesh_data m = device_test::tied_bodies(20, 7, 4);
+    const std::vector<mesh_data> meshes{m, device_test::ball({12, 9, 11}, 6.3f, 7),
+                                        device_test::long_triangles(extent, 5, 3)};
+    vp::grid flat = device_test::box_grid(extent);
+    flat.voxel_size = {0.5f, 1.25f, 0.75f};
+    for (int axis = 0; axis < 3; ++axis)
+        expect_same<measured_target>(meshes, axis == 1 ? flat.crop({5, 3, 2}, {19, 14, 20}) : flat,
+                                     everything_measured{},
+                                     {.bodies = axis == 2 ? vp::bodies::draw : vp::bodies::call, .axis = axis});
 }
 
 TEST(DeviceCells, NothingAndBadIndices) {

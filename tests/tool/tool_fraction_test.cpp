@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // --target fraction: the library's values in files, beside other targets, clamped, of open models, and what is refused.
-#include "tool_test.hpp"
+#include "fraction_support.hpp"
 
 #include <cpu_ref/backend.hpp>
 #include <voxelpipe/voxelpipe.hpp>
@@ -13,58 +13,11 @@
 #include <cstring>
 
 using namespace tool_test;
+using namespace fraction_test;
 
 namespace {
 
 namespace vp = voxelpipe;
-
-struct shape {
-    std::vector<glm::vec3> positions;
-    std::vector<glm::uvec3> triangles;
-};
-
-// The box from LOW to HIGH, its faces outward; its corners are moved along x by SHEAR times their y.
-shape box(const glm::vec3& low, const glm::vec3& high, float shear = 0) {
-    shape made;
-    for (int corner = 0; corner < 8; ++corner) {
-        glm::vec3 p;
-        for (int axis = 0; axis < 3; ++axis) p[axis] = (corner >> axis & 1) != 0 ? high[axis] : low[axis];
-        p.x += shear * p.y;
-        made.positions.push_back(p);
-    }
-    made.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
-                      {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
-    return made;
-}
-
-void add(builder& file, const shape& s) {
-    std::vector<float> positions;
-    for (const glm::vec3& p : s.positions) positions.insert(positions.end(), {p.x, p.y, p.z});
-    std::vector<std::uint8_t> indices;
-    for (const glm::uvec3& t : s.triangles)
-        for (int i = 0; i < 3; ++i) indices.push_back(static_cast<std::uint8_t>(t[i]));
-    const int index_accessor = file.accessor(indices, "SCALAR");
-    json& primitive = file.mesh({{"POSITION", file.accessor(positions, "VEC3")}});
-    primitive["indices"] = index_accessor;
-}
-
-vp::grid grid_of_16() {
-    vp::grid grid;
-    grid.origin = glm::dvec3(-4);
-    grid.voxel_size = glm::dvec3(0.5);
-    grid.extent = glm::ivec3(16);
-    return grid;
-}
-
-// Runs `voxelize m.glb -o OUTPUT` with ARGUMENTS in that grid.
-outcome draw(const scratch_folder& folder, const builder& file, const std::string& output,
-             const std::vector<std::string>& arguments) {
-    file.write_glb(folder / "m.glb");
-    std::vector<std::string> all{folder / "m.glb", "-o",      folder / output, "--origin", "-4,-4,-4", "-s", "0.5",
-                                 "--extent",       "16,16,16"};
-    all.insert(all.end(), arguments.begin(), arguments.end());
-    return run(folder, all);
-}
 
 // What the library gives for these parts as one mesh.
 std::vector<float> library_fractions(const std::vector<shape>& parts, const vp::grid& grid) {
@@ -86,8 +39,6 @@ void expect_same(const std::vector<float>& expected, const array& found) {
     ASSERT_EQ(expected.size(), found.voxels());
     for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_EQ(expected[i], found.at<float>(i)) << i;
 }
-
-const shape tilted = box({-2.1F, -1.3F, -1.7F}, {1.2F, 2.3F, 1.1F}, 0.37F);
 
 TEST(Fraction, NpyHasTheBytesOfTheLibrary) {
     const scratch_folder folder;
@@ -396,6 +347,12 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
     refused({"-t", "area_vector"}, "beside --target area_vector adds the inside", 1, "o.nvdb");
     refused({"-t", "area_vector"}, "slices hold one target, which is occupancy or fraction", 1, "{z}.png");
     refused({"-t", "area_vector", "--backend", "cuda"}, "--target area_vector is drawn on the CPU alone", 5);
+    refused({"-t", "aperture_x,fraction"}, "--target aperture_x is the only target of a run");
+    refused({"-t", "aperture_y", "--solid", "nonzero"}, "it holds voxels; .npy, .npz and .zarr take the faces of", 1,
+            "o.vti");
+    refused({"-t", "area", "--sparse"}, "--sparse and --target area");
+    refused({"-t", "centroid"}, "beside --target centroid adds the inside", 1, "o.nvdb");
+    refused({"-t", "centroid", "--backend", "cuda"}, "--target centroid is drawn on the CPU alone", 5);
     refused({"-t", "fraction", "--backend", "cuda"}, "on the CPU alone", 5);
     const outcome large =
         run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", "fraction", "-r", "1000", "--max-memory", "300"});

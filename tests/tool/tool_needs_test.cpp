@@ -139,6 +139,8 @@ std::vector<needs> all_needs() {
 #ifdef VOXELPIPE_ALL_NEEDS
     all.push_back({".npy", "fraction", "--dense", dense_resolution});
     all.push_back({".npy", "area_vector", "--dense", dense_resolution});
+    all.push_back({".npy", "area,centroid", "--dense", dense_resolution});
+    all.push_back({".npy", "aperture_y", "--dense", dense_resolution});
 #endif
     return all;
 }

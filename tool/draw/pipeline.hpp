@@ -87,6 +87,9 @@ public:
     // some layers, and one finishes it.
     [[nodiscard]] volume unset_volume() const {
         volume result = volume_of(request_.grid);
+        if (const int axis = axis_of_faces(request_.targets.empty() ? target::occupancy : request_.targets.front());
+            axis >= 0)
+            ++result.extent[static_cast<std::size_t>(axis)]; // which is the only target
         for (const target wanted : request_.targets)
             result.add_unset(std::string(info_of(wanted).name), info_of(wanted).type, info_of(wanted).components);
         // Channels that nobody asked for come last.

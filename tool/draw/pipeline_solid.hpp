@@ -13,6 +13,7 @@
 #include <voxelpipe/solid/diagnose_repair.hpp>
 
 #include <algorithm>
+#include <array>
 #include <bitset>
 #include <cstddef>
 #include <cstdint>
@@ -187,23 +188,47 @@ void pipeline<Backend>::examine_solid_bits(const voxelpipe::grid& whole) {
     if (status.ok()) counts.flood = status.solid.flood;
 }
 
-// Cell shader that returns the fraction, and puts the component along the rows' axis of the mesh's area within the
-// voxel into its place.
-struct fraction_and_area {
-    float* areas = nullptr; // three a voxel; null: none are wanted
+// Cell shader that returns the fraction, and puts what belongs to the rows' axis into its place: the component of the
+// mesh's area within the voxel, and the part of its faces that is inside.
+struct fraction_and_faces {
+    float* areas = nullptr;     // three a voxel; null: none are wanted
+    float* apertures = nullptr; // of the faces across the axis, one more along it than voxels
     glm::ivec3 extent{}, offset{};
     int axis = 0;
     double face = 1; // area of a voxel's face across the axis
 
+    [[nodiscard]] std::int64_t index(const vp::cell_fragment& f, const glm::ivec3& in) const {
+        const glm::ivec3 p = f.voxel - offset;
+        return (static_cast<std::int64_t>(p.z) * in.y + p.y) * in.x + p.x;
+    }
     vp::output<float> operator()(const vp::cell_fragment& f) const {
-        if (areas != nullptr) {
-            const glm::ivec3 p = f.voxel - offset;
-            const std::int64_t voxel = (static_cast<std::int64_t>(p.z) * extent.y + p.y) * extent.x + p.x;
-            // The units' difference is exact.
-            areas[3 * voxel + axis] =
+        if (areas != nullptr) // the units' difference is exact
+            areas[3 * index(f, extent) + axis] =
                 static_cast<float>(static_cast<double>(f.aperture - f.next_aperture) * 0x1p-44 * face);
+        if (apertures != nullptr) {
+            glm::ivec3 in = extent;
+            ++in[axis];
+            float* const lower = apertures + index(f, in);
+            const std::int64_t step = axis == 0 ? 1 : axis == 1 ? in.x : static_cast<std::int64_t>(in.x) * in.y;
+            const auto part = [](std::int64_t units) { return static_cast<float>(units) * 0x1p-44F; };
+            *lower = part(f.aperture);
+            if (f.voxel[axis] - offset[axis] + 1 == extent[axis]) lower[step] = part(f.next_aperture);
         }
         return vp::outputs(f.fraction);
+    }
+};
+
+// The same with the area and the centroid of the part inside, null where they are not wanted.
+struct measured_fraction : fraction_and_faces {
+    using fragment = vp::measured_cell<vp::cell_value::centroid, vp::cell_value::area>;
+    float* sizes = nullptr;
+    float* centroids = nullptr; // three a voxel
+
+    vp::output<float> operator()(const fragment& f) const {
+        const std::int64_t voxel = index(f, extent);
+        if (sizes != nullptr) sizes[voxel] = static_cast<float>(f.area);
+        for (int i = 0; i < 3 && centroids != nullptr; ++i) centroids[3 * voxel + i] = f.centroid[i];
+        return fraction_and_faces::operator()(f);
     }
 };
 
@@ -216,36 +241,55 @@ void pipeline<Backend>::draw_cells(volume& result) {
     outer_framebuffer_.reset();
     report_from(num_passes() - 1, 0, 1);
     const voxelpipe::grid grid = uploaded_->relative_grid();
-    fraction_and_area shader{nullptr, request_.grid.extent, grid.offset, 0, 1};
-    const auto num_voxels = static_cast<std::size_t>(result.num_voxels());
-    if (wants(target::area_vector)) {
-        shader.areas = channel_at<float>(result, info_of(target::area_vector).name, 0);
-        std::fill_n(shader.areas, 3 * num_voxels, 0.0F); // most voxels get no fragment
-    }
+    const glm::ivec3 extent = request_.grid.extent;
+    const auto num_voxels =
+        static_cast<std::size_t>(extent.x) * static_cast<std::size_t>(extent.y) * static_cast<std::size_t>(extent.z);
+    // A channel of zeros, for most voxels get no fragment; null where nobody wants it.
+    const auto zeros = [&](target id) -> float* {
+        if (!wants(id)) return nullptr;
+        channel& c = *result.find(info_of(id).name);
+        std::fill(c.data.begin(), c.data.end(), std::byte{0});
+        return channel_at<float>(result, info_of(id).name, 0);
+    };
+    measured_fraction shader;
+    shader.extent = extent;
+    shader.offset = grid.offset;
+    shader.sizes = zeros(target::area);
+    shader.centroids = zeros(target::centroid);
+    float* const areas = zeros(target::area_vector);
+    const std::array<float*, 3> apertures{zeros(target::aperture_x), zeros(target::aperture_y),
+                                          zeros(target::aperture_z)};
     std::vector<float> scratch;
     if (!wants(target::fraction)) scratch.resize(num_voxels);
     float* const values =
         scratch.empty() ? channel_at<float>(result, info_of(target::fraction).name, 0) : scratch.data();
-    const auto view = vp::framebuffer_view<vp::target<float, vp::blend::replace>>::on(shader.extent, values);
-    using draw = vp::draw<vp::mesh_view<>, instanced_vertex_shader, fraction_and_area>;
+    const auto view = vp::framebuffer_view<vp::target<float, vp::blend::replace>>::on(extent, values);
+    vp::cell_options options;
+    const auto draw_by = [&](const auto& of_voxels) {
+        using draw = vp::draw<vp::mesh_view<>, instanced_vertex_shader, std::remove_cvref_t<decltype(of_voxels)>>;
+        std::vector<draw> draws;
+        for (const auto& d : uploaded_->bits_draws()) draws.push_back({d.mesh, d.vertex_shader, of_voxels});
+        return vp::voxelize_cells(backend_, draws, grid, view, options);
+    };
     fraction_counts counts;
     vp::status status;
     {
         const stage_timer timer{*this, "fractions"};
-        // Rows along x come last: the fractions and the counts are theirs.
-        for (int axis = shader.areas == nullptr ? 0 : 2; axis >= 0; --axis) {
+        // Rows along x come last: the fractions, all that is no axis', and the counts are theirs.
+        for (int axis = 2; axis >= 0; --axis) {
+            shader.areas = areas;
+            shader.apertures = apertures[static_cast<std::size_t>(axis)];
+            if (axis != 0 && areas == nullptr && shader.apertures == nullptr) continue;
             shader.axis = axis;
             shader.face = grid.voxel_size[(axis + 1) % 3] * grid.voxel_size[(axis + 2) % 3];
-            std::vector<draw> draws;
-            for (const auto& d : uploaded_->bits_draws()) draws.push_back({d.mesh, d.vertex_shader, shader});
-            vp::cell_options options;
             options.axis = axis;
             options.count_open_edges = axis == 0;
-            status = vp::voxelize_cells(backend_, draws, grid, view, options);
+            const bool measures = axis == 0 && (shader.sizes != nullptr || shader.centroids != nullptr);
+            status = measures ? draw_by(shader) : draw_by(static_cast<const fraction_and_faces&>(shader));
             check(status, request_);
             counts.open_rows += status.cells.open_rows;
-            counts.rows += static_cast<std::uint64_t>(shader.extent[(axis + 1) % 3]) *
-                           static_cast<std::uint64_t>(shader.extent[(axis + 2) % 3]);
+            counts.rows +=
+                static_cast<std::uint64_t>(extent[(axis + 1) % 3]) * static_cast<std::uint64_t>(extent[(axis + 2) % 3]);
         }
         if (request_.clamp)
             memory_access<Backend>::read(

@@ -28,8 +28,13 @@ enum class target : std::uint8_t {
     depth,
     distance,
     nearest,
-    fraction,
-    area_vector
+    fraction, // those of cut cells follow
+    area_vector,
+    area,
+    centroid,
+    aperture_x,
+    aperture_y,
+    aperture_z
 };
 
 struct target_info {
@@ -62,17 +67,28 @@ inline constexpr std::array all_targets{
                 "how much of the voxel is inside, 0 to 1 if no parts overlap; see FRACTIONS"},
     target_info{target::area_vector, "area_vector", scalar::f32, 3,
                 "sum of the area vectors of the surface in the voxel, outward; see FRACTIONS"},
+    target_info{target::area, "area", scalar::f32, 1, "area of the surface in the voxel; see FRACTIONS"},
+    target_info{target::centroid, "centroid", scalar::f32, 3,
+                "centroid of the part of the voxel that is inside, from its centre in voxels; see FRACTIONS"},
+    target_info{target::aperture_x, "aperture_x", scalar::f32, 1,
+                "how much of each face across x is inside, one more along x; see FRACTIONS"},
+    target_info{target::aperture_y, "aperture_y", scalar::f32, 1, "the same of faces across y"},
+    target_info{target::aperture_z, "aperture_z", scalar::f32, 1, "the same of faces across z"},
 };
 
 inline constexpr std::size_t target_count = all_targets.size();
 // Those of surfaces and solids, dense and sparse. Two others go with --distance, and those of cut cells are dense
 // alone.
-inline constexpr std::span target_table = std::span(all_targets).first<target_count - 4>();
+inline constexpr std::span target_table = std::span(all_targets).first<target_count - 9>();
 
 [[nodiscard]] constexpr const target_info& info_of(target id) { return all_targets[static_cast<std::size_t>(id)]; }
 
 // What is measured of the whole of each triangle: the values of cut cells.
-[[nodiscard]] constexpr bool is_of_cells(target id) { return id == target::fraction || id == target::area_vector; }
+[[nodiscard]] constexpr bool is_of_cells(target id) { return id >= target::fraction; }
+// What is measured of faces, of which a grid has one more along their axis than voxels: 0 to 2; -1 for other targets.
+[[nodiscard]] constexpr int axis_of_faces(target id) {
+    return id < target::aperture_x ? -1 : static_cast<int>(id) - static_cast<int>(target::aperture_x);
+}
 
 [[nodiscard]] constexpr bool is_color(target id) { return info_of(id).name.starts_with("color"); }
 

@@ -40,6 +40,45 @@ struct cell_fragment {
                                 // area within the voxel, to the last bit
 };
 
+// What a voxel can have beside a cell_fragment's members. Each is computed only if a shader asks for it.
+enum class cell_value : std::uint8_t {
+    centroid, // of the part inside
+    area,     // of the mesh within the voxel, and that area's centroid
+    sheets    // whether more than one sheet of the surface cuts the voxel
+};
+
+namespace core {
+
+template <cell_value>
+struct value_of_cell;
+template <>
+struct value_of_cell<cell_value::centroid> {
+    // The middle of the part inside: from the voxel's centre, in voxels, -0.5 to 0.5. 0 where the fraction is less than
+    // 2^-20 or the quotient lies more than 2^-10 beyond the voxel, as overlapping and inverted parts can have it.
+    glm::vec3 centroid;
+};
+template <>
+struct value_of_cell<cell_value::area> {
+    double area;             // of all triangles' parts within the voxel, in squared units of the world
+    glm::vec3 area_centroid; // from the voxel's centre, in voxels, -0.5 to 0.5; 0 without area
+};
+template <>
+struct value_of_cell<cell_value::sheets> {
+    // The triangles that cut the voxel (is_cut) are no single sheet. Two of them are of one sheet if they share an
+    // edge, by its snapped ends, that meets the closed voxel, or if such neighbours link them.
+    bool is_multi_cut;
+};
+
+} // namespace core
+
+// What a shader gets that asks for more: it names this type as `fragment`, with what it needs, each once, such as
+//   struct middle { using fragment = vp::measured_cell<vp::cell_value::centroid>;
+//                   VOXELPIPE_HD auto operator()(const fragment& f) const { return vp::outputs(f.centroid.x); } };
+// With cell_value::area the upper faces along all axes belong to the voxel, for is_cut too: triangles in them are
+// drawn.
+template <cell_value... Values>
+struct measured_cell : cell_fragment, core::value_of_cell<Values>... {};
+
 // Cell shader that returns the fraction: into one target of float.
 struct fraction {
     // The fragment's fraction.
@@ -52,8 +91,26 @@ namespace core {
 // framebuffer_view, options, number of triangles).
 struct cells_tag {};
 
+// The type that a shader names as `fragment`, and the bits of what it needs.
 template <class CellShader>
-using cell_output = std::remove_cvref_t<std::invoke_result_t<const CellShader&, const cell_fragment&>>;
+struct fragment_of_cells {
+    using type = cell_fragment;
+};
+template <class CellShader>
+requires requires { typename CellShader::fragment; }
+struct fragment_of_cells<CellShader> {
+    using type = typename CellShader::fragment;
+};
+template <class CellShader>
+using cell_fragment_of = typename fragment_of_cells<CellShader>::type;
+template <class Fragment>
+inline constexpr unsigned
+    needs_of_cells = (std::is_base_of_v<value_of_cell<cell_value::centroid>, Fragment> ? needs_centroid : 0) |
+                     (std::is_base_of_v<value_of_cell<cell_value::area>, Fragment> ? needs_area : 0) |
+                     (std::is_base_of_v<value_of_cell<cell_value::sheets>, Fragment> ? needs_sheets : 0);
+
+template <class CellShader>
+using cell_output = std::remove_cvref_t<std::invoke_result_t<const CellShader&, const cell_fragment_of<CellShader>&>>;
 
 // True where both shaders can be used with the mesh; otherwise one readable line says why not.
 template <class Mesh, class VertexShader, class CellShader>
@@ -61,10 +118,14 @@ template <class Mesh, class VertexShader, class CellShader>
     if constexpr (check_vertex_shader<Mesh, VertexShader>()) {
         constexpr bool copyable = std::is_trivially_copyable_v<CellShader>;
         static_assert(copyable, "voxelpipe: a cell's shader must be trivially copyable");
-        constexpr bool callable = std::is_invocable_v<const CellShader&, const cell_fragment&>;
-        static_assert(callable, "voxelpipe: the cell's shader cannot be called with const cell_fragment& (is its "
-                                "operator() const? a cell has no barycentrics, normals or varyings)");
-        if constexpr (copyable && callable) {
+        constexpr bool known = std::is_base_of_v<cell_fragment, cell_fragment_of<CellShader>>;
+        static_assert(known, "voxelpipe: a cell's shader names as `fragment` a vp::measured_cell of what it needs");
+        constexpr bool callable = std::is_invocable_v<const CellShader&, const cell_fragment_of<CellShader>&>;
+        static_assert(callable,
+                      "voxelpipe: the cell's shader cannot be called with const cell_fragment&, or with what it "
+                      "names as `fragment` (is its operator() const? a cell has no barycentrics, normals or "
+                      "varyings)");
+        if constexpr (copyable && known && callable) {
             constexpr bool gives_output = is_output<cell_output<CellShader>>;
             static_assert(gives_output,
                           "voxelpipe: a cell's shader must return vp::outputs(...), one value per render target; one "
@@ -96,7 +157,8 @@ template <class Mesh, class VertexShader, class CellShader, class... Targets>
 // exactly, and the sum of all is the mesh's volume up to roundings of 2^-44. An open mesh is defined by rows along the
 // axis, from the low end. Triangles count as outside iff they miss the grid's intervals along the two other axes.
 // Without any triangles it clears, as vp::clear does. Returns after the work is done. Fails with winding_too_large, and
-// writes nothing, where 2^19 triangles or more could wrap the sums of a row.
+// writes nothing, where 2^19 triangles or more could wrap the sums of a row. A cell's shader that needs centroids or
+// areas names them (measured_cell).
 template <class Backend, class Mesh, class VertexShader, class CellShader, class... Targets>
 [[nodiscard]] status voxelize_cells(Backend& backend, std::span<const draw<Mesh, VertexShader, CellShader>> draws,
                                     const grid& g, const framebuffer_view<Targets...>& fb,

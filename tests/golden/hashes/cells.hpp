@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Cut cells: fractions, apertures and sums of closed, open and broken meshes, by each axis, by draws and in a crop.
+// Cut cells: fractions, apertures and sums of closed, open and broken meshes, by each axis, by draws and in a crop; and
+// all that a shader can ask for.
 
 #include "cases.hpp"
 
@@ -17,24 +18,48 @@ struct parts_of_cell {
     }
 };
 
-template <class Backend>
-void cell_values(Backend& backend, digest& d, const std::vector<mesh_data>& bodies, const vp::grid& grid,
-                 const vp::cell_options& options) {
-    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, parts_of_cell>;
-    using number = vp::target<std::int64_t, vp::blend::add>;
+struct measures_of_cell {
+    using fragment = vp::measured_cell<vp::cell_value::centroid, vp::cell_value::area, vp::cell_value::sheets>;
+    VOXELPIPE_HD auto operator()(const fragment& f) const {
+        return vp::outputs(f.centroid.x, f.centroid.y, f.centroid.z, f.area, f.area_centroid.x, f.area_centroid.y,
+                           f.area_centroid.z, mixed(f.is_multi_cut ? 3u : 2u, f.is_cut ? 1u : 0u));
+    }
+};
+
+template <class Backend, class... Targets, class Shader>
+void cell_values_into(Backend& backend, digest& d, const std::vector<mesh_data>& bodies, const vp::grid& grid,
+                      const vp::cell_options& options, const Shader& shader,
+                      vp::framebuffer<Backend, Targets...>&& fb) {
+    using draw_type = vp::draw<vp::mesh_view<>, vp::passthrough, Shader>;
     std::vector<vp::mesh<Backend>> meshes;
     for (const mesh_data& m : bodies) meshes.push_back(upload(backend, m));
     std::vector<draw_type> draws;
-    for (const auto& m : meshes) draws.push_back({m.view(), {}, {}});
-    vp::framebuffer<Backend, vp::target<float, vp::blend::replace>, number, number, number,
-                    vp::target<std::uint32_t, vp::blend::bit_xor>>
-        fb{backend, grid.extent};
+    for (const auto& m : meshes) draws.push_back({m.view(), {}, shader});
     const vp::status s = vp::voxelize_cells(backend, draws, grid, fb, options);
     add_counts(d, s);
     const vp::cell_counters& c = s.cells;
     d.add(std::vector<std::uint64_t>{c.volume_low, static_cast<std::uint64_t>(c.volume_high), c.cut_voxels,
                                      c.below_zero, c.above_one, c.open_rows, c.open_edges, c.cell_records});
-    vp::core::for_each_index<5>([&]<std::size_t I>() { d.add(vp::get<I>(fb).to_host(backend)); });
+    if (c.lost_centroids != 0) d.add(std::vector<std::uint64_t>{c.lost_centroids});
+    vp::core::for_each_index<sizeof...(Targets)>([&]<std::size_t I>() { d.add(vp::get<I>(fb).to_host(backend)); });
+}
+
+template <class Backend>
+void cell_values(Backend& backend, digest& d, const std::vector<mesh_data>& bodies, const vp::grid& grid,
+                 const vp::cell_options& options) {
+    using number = vp::target<std::int64_t, vp::blend::add>;
+    cell_values_into(backend, d, bodies, grid, options, parts_of_cell{},
+                     vp::framebuffer<Backend, vp::target<float, vp::blend::replace>, number, number, number,
+                                     vp::target<std::uint32_t, vp::blend::bit_xor>>{backend, grid.extent});
+}
+template <class Backend>
+void cell_measures(Backend& backend, digest& d, const std::vector<mesh_data>& bodies, const vp::grid& grid,
+                   const vp::cell_options& options) {
+    using number = vp::target<float, vp::blend::replace>;
+    cell_values_into(
+        backend, d, bodies, grid, options, measures_of_cell{},
+        vp::framebuffer<Backend, number, number, number, vp::target<double, vp::blend::replace>, number, number, number,
+                        vp::target<std::uint32_t, vp::blend::bit_xor>>{backend, grid.extent});
 }
 
 template <class Backend>
@@ -55,6 +80,16 @@ void add_cells(case_table<Backend>& cases) {
     by_draws.bodies = vp::bodies::draw;
     add("draws.shells", shells(), odd_grid(), by_draws);
     add("crop.shells", of("shells"), crop_of_odd_grid(), {});
+    const auto measure = [&](const std::string& name, const std::vector<mesh_data>& bodies, const vp::grid& grid,
+                             const vp::cell_options& options) {
+        cases.push_back({"cells.measures." + name,
+                         [=](Backend& backend, digest& d) { cell_measures(backend, d, bodies, grid, options); }});
+    };
+    for (const char* const mesh : {"torus", "soup", "open"}) measure(mesh, of(mesh), odd_grid(), {});
+    vp::cell_options by_y = by_draws;
+    by_y.axis = 1;
+    measure("draws.axis.y.shells", shells(), odd_grid(), by_y);
+    measure("crop.shells", of("shells"), crop_of_odd_grid(), {});
 }
 
 } // namespace golden

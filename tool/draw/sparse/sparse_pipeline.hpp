@@ -280,6 +280,11 @@ private:
             case target::nearest:
             case target::fraction: // of dense grids alone
             case target::area_vector:
+            case target::area:
+            case target::centroid:
+            case target::aperture_x:
+            case target::aperture_y:
+            case target::aperture_z:
                 break;
             }
         }

@@ -399,6 +399,17 @@ void understand_fractions(command_line& options, const raw_options& raw) {
     if (options.by_slabs)
         throw usage_error(name + " is one piece of work: no --resume, and no processes that share a model");
     if (options.write.levels) throw usage_error("--levels" + together + "cut cells have no mip levels");
+    for (const target id : request.targets) {
+        if (axis_of_faces(id) < 0) continue;
+        const std::string faces = "--target " + std::string(info_of(id).name);
+        if (request.targets.size() != 1)
+            throw usage_error(faces + " is the only target of a run: a grid has more faces than voxels");
+        for (const std::filesystem::path& output : options.outputs)
+            if (const std::string_view of = find_format(output)->extension;
+                of != ".npy" && of != ".npz" && of != ".zarr")
+                throw usage_error('"' + output.string() +
+                                  "\": it holds voxels; .npy, .npz and .zarr take the faces of " + faces);
+    }
     for (const std::filesystem::path& output : options.outputs) {
         const format& f = *find_format(output);
         const bool is_chosen = f.has_threshold && raw.threshold; // by the fractions

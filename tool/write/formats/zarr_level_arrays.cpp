@@ -102,6 +102,11 @@ void with_rule(const channel& c, const F& f) {
         throw write_error(c.name, "distances have no levels");
     case target::fraction: // nor with these
     case target::area_vector:
+    case target::area:
+    case target::centroid:
+    case target::aperture_x:
+    case target::aperture_y:
+    case target::aperture_z:
         throw write_error(c.name, "cut cells have no levels");
     }
 }

@@ -6,48 +6,47 @@
 // before planes, and the volume in front of a voxel's upper face. Rows run along x; a pixel is a square of y and z
 // (docs/design.md, "Cut cells").
 
-#include <voxelpipe/cells/core/cut_polygon.hpp>
+#include <voxelpipe/cells/core/cell_measures.hpp>
 
 #include <cstdint>
 
 namespace voxelpipe::core {
 
-inline constexpr int cell_unit_bits = 44; // u = 2^-44 of a voxel, or of a voxel's face
-
-// R[v]: the nearest multiple of u, halves away from 0, for |v| < 2^18.
-[[nodiscard]] VOXELPIPE_HD inline std::int64_t round_to_cell_units(double v) {
-    const double magnitude = exact::fma(v < 0.0 ? -v : v, 0x1p44, 0.5);
-    const auto units = static_cast<std::int64_t>(magnitude);
-    return v < 0.0 ? -units : units;
-}
-
 // The edge term of a pixel, from a vertex to a later one: R[integral over the edge's z in [k, k + 1] of min(max(j + 1 -
-// y(z), 0), 1) dz], negative if z falls. A function of the edge and the pixel alone. y and z: the pixel's lowest corner
-// in the triangle's units.
-template <class Int>
-[[nodiscard]] VOXELPIPE_HD std::int64_t edge_term(const cell_triangle<Int>& t, int first, int last, std::int64_t y,
-                                                  std::int64_t z) {
+// y(z), 0), 1) dz], negative if z falls; and with moments the integrals of y and z from the pixel's centre over what
+// that covers, else 0. A function of the edge and the pixel alone. y and z: the pixel's lowest corner in the triangle's
+// units.
+template <bool WithMoments, class Int>
+[[nodiscard]] VOXELPIPE_HD pixel_sums edge_terms(const cell_triangle<Int>& t, int first, int last, std::int64_t y,
+                                                 std::int64_t z) {
     const std::int64_t size = std::int64_t{1} << t.fraction;
     const bool falls = t.p[last][2] < t.p[first][2];
     const int low = falls ? last : first, high = falls ? first : last;
     const std::int64_t y0 = t.p[low][1] - y, z0 = t.p[low][2] - z, y1 = t.p[high][1] - y, z1 = t.p[high][2] - z;
     const std::int64_t begin = z0 > 0 ? z0 : 0, end = z1 < size ? z1 : size;
-    if (begin >= end) return 0;
-    const auto sign = [&](std::int64_t term) { return falls ? -term : term; };
-    // A height is a multiple of 2^-F, the part of an edge within the pixel one of 2^-(2F + 1).
-    const auto height = [&](std::int64_t h) { return h << (cell_unit_bits - t.fraction); };
-    if (y0 >= size && y1 >= size) return 0;
-    if (y0 <= 0 && y1 <= 0) return sign(height(end - begin));
-    const bool is_within = y0 >= 0 && y0 <= size && y1 >= 0 && y1 <= size;
-    if (is_within && begin == z0 && end == z1)
-        return sign((2 * size - y0 - y1) * (end - begin) << (cell_unit_bits - 2 * t.fraction - 1));
+    if (begin >= end) return {0, 0, 0};
+    const auto sign = [&](std::int64_t cover, std::int64_t of_y, std::int64_t of_z) {
+        return falls ? pixel_sums{-cover, -of_y, -of_z} : pixel_sums{cover, of_y, of_z};
+    };
+    // A height is a multiple of 2^-F, the part of an edge within the pixel and the moment of a height ones of 2^-(2F +
+    // 1).
+    const std::int64_t half_square = std::int64_t{1} << (cell_unit_bits - 2 * t.fraction - 1);
+    const auto height = [&] {
+        return sign((end - begin) << (cell_unit_bits - t.fraction), 0,
+                    WithMoments ? (end - begin) * (begin + end - size) * half_square : 0);
+    };
+    if (y0 >= size && y1 >= size) return {0, 0, 0};
+    if (y0 <= 0 && y1 <= 0) return height();
+    const bool is_whole = y0 >= 0 && y0 <= size && y1 >= 0 && y1 <= size && begin == z0 && end == z1;
+    const std::int64_t of_whole = (2 * size - y0 - y1) * (end - begin) * half_square;
+    if (!WithMoments && is_whole) return sign(of_whole, 0, 0);
 
     // y at a z, times the edge's height: exact.
     const auto rise = static_cast<Int>(z1 - z0), run = static_cast<Int>(y1 - y0);
     const auto y_at = [&](std::int64_t at) { return static_cast<Int>(y0) * rise + run * static_cast<Int>(at - z0); };
     const Int y_begin = y_at(begin), y_end = y_at(end), whole = static_cast<Int>(size) * rise;
-    if (y_begin >= whole && y_end >= whole) return 0;
-    if (y_begin <= 0 && y_end <= 0) return sign(height(end - begin));
+    if (y_begin >= whole && y_end >= whole) return {0, 0, 0};
+    if (y_begin <= 0 && y_end <= 0) return height();
     const double voxel = core::bit_cast<double>(static_cast<std::uint64_t>(1023 - t.fraction) << 52); // 2^-F
     // z, in voxels, where y is that of a side of the pixel, within the edge's part.
     const auto z_at = [&](std::int64_t side) {
@@ -61,10 +60,12 @@ template <class Int>
     };
     double from = exact::mul(exact::to_double(begin), voxel), to = exact::mul(exact::to_double(end), voxel);
     double beside = 0.0; // height of the part that lies below the pixel in y
-    double f_from = 0.0, f_to = 0.0;
+    double f_from = 0.0, f_to = 0.0, beside_z = 0.0;
+    const auto middle_of = [](double p, double q) { return exact::fma(p + q, 0.5, -0.5); }; // from the pixel's
     if (y_begin <= 0) { // crosses the lower side upward
         const double at = z_at(0);
         beside = at - from;
+        if constexpr (WithMoments) beside_z = exact::mul(beside, middle_of(from, at));
         from = at;
         f_from = 1.0;
     } else if (y_begin >= whole) {
@@ -75,6 +76,7 @@ template <class Int>
     if (y_end <= 0) {
         const double at = z_at(0);
         beside = to - at;
+        if constexpr (WithMoments) beside_z = exact::mul(beside, middle_of(at, to));
         to = at;
         f_to = 1.0;
     } else if (y_end >= whole) {
@@ -82,13 +84,26 @@ template <class Int>
     } else {
         f_to = 1.0 - y_in_voxels(y_end);
     }
-    return sign(round_to_cell_units(exact::fma(to - from, exact::mul(f_from + f_to, 0.5), beside)));
+    const std::int64_t cover =
+        is_whole ? of_whole : round_to_cell_units(exact::fma(to - from, exact::mul(f_from + f_to, 0.5), beside));
+    if constexpr (!WithMoments) return sign(cover, 0, 0);
+    // f is linear from `from` to `to`: integrals of f (1 - f) / 2, and of f times z.
+    const double sum = f_from + f_to, squares = exact::fma(f_from, f_from, exact::mul(f_to, sum));
+    const double of_y = exact::mul(to - from, exact::fma(sum, 3.0, exact::mul(squares, -2.0)));
+    const double z_from = from - 0.5, z_to = to - 0.5;
+    const double twice_z =
+        exact::fma(f_from, exact::fma(z_from, 2.0, z_to), exact::mul(f_to, exact::fma(z_to, 2.0, z_from)));
+    const double of_z = exact::fma(exact::div(to - from, 6.0), twice_z, beside_z);
+    return sign(cover, round_to_cell_units(exact::div(of_y, 12.0)), round_to_cell_units(of_z));
 }
 
-// The cover of a pixel by a triangle, positive where n_x < 0: the sum of its three edge terms, of the sorted triangle.
-template <class Int>
-[[nodiscard]] VOXELPIPE_HD std::int64_t pixel_cover(const cell_triangle<Int>& t, std::int64_t y, std::int64_t z) {
-    return edge_term(t, 0, 1, y, z) + edge_term(t, 1, 2, y, z) - edge_term(t, 0, 2, y, z);
+// The cover of a pixel by a triangle, positive where n_x < 0, and its moments: the sums of its three edge terms, of the
+// sorted triangle.
+template <bool WithMoments, class Int>
+[[nodiscard]] VOXELPIPE_HD pixel_sums pixel_cover(const cell_triangle<Int>& t, std::int64_t y, std::int64_t z) {
+    const pixel_sums a = edge_terms<WithMoments>(t, 0, 1, y, z), b = edge_terms<WithMoments>(t, 1, 2, y, z),
+                     c = edge_terms<WithMoments>(t, 0, 2, y, z);
+    return {a.cover + b.cover - c.cover, a.y + b.y - c.y, a.z + b.z - c.z};
 }
 
 // A polygon within a pixel: minus its area in the projection, positive where n_x < 0; and minus the integral of the
@@ -124,11 +139,6 @@ template <bool WithVolume, class Int>
     if constexpr (WithVolume) s.volume = exact::div(s.volume, 6.0);
     return s;
 }
-
-// What a triangle adds to a row: to the cover before the voxel's upper face, and to the volume within the voxel.
-struct cell_terms {
-    std::int64_t cover, volume; // a and c, in u
-};
 
 // The pixels and voxels of a crop, in the triangle's units.
 struct cell_box {
@@ -173,16 +183,35 @@ template <class Int>
     return {first < last ? first : last, last};
 }
 
+// Sets what a triangle's part within a voxel measures. corner: the voxel's lowest, in the triangle's units.
+template <class Terms, class Int>
+VOXELPIPE_HD void add_parts(const cell_triangle<Int>& t, const cutting_planes& planes, const cut_polygon& part,
+                            const std::int64_t (&corner)[3], const area_ratio& areas, Terms& terms) {
+    const auto round = [&](double v) { return t.is_odd ? -round_to_cell_units(v) : round_to_cell_units(v); };
+    const std::int64_t upper = corner[0] + (std::int64_t{1} << t.fraction);
+    terms.volume = round(sum_polygon<true>(t, planes, part, corner[1], corner[2], upper).volume);
+    if constexpr (has_moments<Terms>) {
+        const polygon_moments m = sum_moments<true>(t, planes, part, corner[1], corner[2], upper);
+        terms.volume_x = round(m.volume_x);
+        terms.volume_y = round(m.volume_y);
+        terms.volume_z = round(m.volume_z);
+    }
+    if constexpr (has_areas<Terms>) static_cast<area_terms&>(terms) = sum_areas(t, planes, part, corner, areas);
+}
+
 // Calls visit(y, z, i, terms) for each voxel of a pixel in which a part of the triangle lies, relative to its base: i
 // from lo[0] - 1, which stands for all voxels before the box, to hi[0], for all behind it. With OnlyCount the terms are
 // 0.
 VOXELPIPE_ANY_CALLABLE
-template <bool OnlyCount, class Int, class Visit>
+template <bool OnlyCount, class Terms, class Int, class Visit>
 VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_polygon& column, cutting_planes& planes,
-                                         const cell_box& box, std::int64_t j, std::int64_t k, Visit&& visit) {
+                                         const cell_box& box, const area_ratio& areas, std::int64_t j, std::int64_t k,
+                                         Visit&& visit) {
     const std::int64_t y = j << t.fraction, z = k << t.fraction;
     const auto oriented = [&](std::int64_t v) { return t.is_odd ? -v : v; };
-    const std::int64_t cover = OnlyCount ? 0 : oriented(pixel_cover(t, y, z));
+    pixel_sums row{0, 0, 0};
+    if (!OnlyCount) row = pixel_cover<has_moments<Terms>>(t, y, z);
+    row = {oriented(row.cover), oriented(row.y), oriented(row.z)};
     cell_span span{-1, -1}; // in the lower plane of the lowest voxel
     if (t.reach[0] > 1)
         span = span_of(t, planes, column);
@@ -190,32 +219,49 @@ VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_
         for (int c = 0; c < column.count; ++c)
             if (corner_side(t, planes, column, c, 0, 0) > 0) span = {0, 0};
     const std::int64_t before_box = box.lo[0] - 1;
-    std::int64_t so_far = 0; // B at the lower face of the next voxel
+    pixel_sums so_far{0, 0, 0}; // B at the lower face of the next voxel
     std::int64_t i = span.first;
     if (i < box.lo[0]) i = before_box;
     while (true) {
         if (i >= box.hi[0]) { // all that lies behind
-            visit(j, k, box.hi[0], cell_terms{cover - so_far, 0});
+            Terms terms{};
+            terms.cover = row.cover - so_far.cover;
+            if constexpr (has_moments<Terms>) {
+                terms.cover_y = row.y - so_far.y;
+                terms.cover_z = row.z - so_far.z;
+            }
+            visit(j, k, box.hi[0], terms);
             return;
         }
         const std::int64_t upper = i + 1;
         const bool is_last = upper > span.last;
         cut_polygon lower = column;
         planes.at[1] = upper << t.fraction;
-        cell_terms terms{0, 0};
+        Terms terms{};
         if (!OnlyCount) {
             if (!is_last) cut(t, planes, 1, true, lower);
-            const std::int64_t before =
-                is_last ? cover : oriented(round_to_cell_units(sum_polygon<false>(t, planes, lower, y, z, 0).cover));
-            terms.cover = before - so_far;
+            pixel_sums before = row;
+            if (!is_last) {
+                before.cover = oriented(round_to_cell_units(sum_polygon<false>(t, planes, lower, y, z, 0).cover));
+                if constexpr (has_moments<Terms>) {
+                    const polygon_moments m = sum_moments<false>(t, planes, lower, y, z, 0);
+                    before.y = oriented(round_to_cell_units(m.cover_y));
+                    before.z = oriented(round_to_cell_units(m.cover_z));
+                }
+            }
+            terms.cover = before.cover - so_far.cover;
+            if constexpr (has_moments<Terms>) {
+                terms.cover_y = before.y - so_far.y;
+                terms.cover_z = before.z - so_far.z;
+            }
             so_far = before;
             if (i != before_box) {
                 if (i != span.first) {
                     planes.at[0] = i << t.fraction;
                     cut(t, planes, 0, false, lower);
                 }
-                terms.volume =
-                    oriented(round_to_cell_units(sum_polygon<true>(t, planes, lower, y, z, planes.at[1]).volume));
+                const std::int64_t corner[3] = {i << t.fraction, y, z};
+                add_parts(t, planes, lower, corner, areas, terms);
             }
         }
         visit(j, k, i, terms);
@@ -229,6 +275,7 @@ template <class Int>
 [[nodiscard]] VOXELPIPE_HD bool meets_inside(const cell_triangle<Int>& t, const cutting_planes& planes,
                                              const cut_polygon& poly) {
     for (int plane = 2; plane < 6; ++plane) {
+        if (plane / 2 == t.lifted) continue; // all of it lies in the pixel's upper side
         bool has_any = false;
         for (int i = 0; i < poly.count; ++i) {
             const int s = corner_side(t, planes, poly, i, plane / 2, planes.at[plane]);
@@ -241,30 +288,41 @@ template <class Int>
 
 // The same for a triangle within one voxel, in closed form: its cover is exact, and so is the numerator of its volume.
 VOXELPIPE_ANY_CALLABLE
-template <class Int, class Visit>
-VOXELPIPE_HD void visit_only_cell(const cell_triangle<Int>& t, const cell_box& box, Visit&& visit) {
+template <bool OnlyCount, class Terms, class Int, class Visit>
+VOXELPIPE_HD void visit_only_cell(const cell_triangle<Int>& t, const cell_box& box, const area_ratio& areas,
+                                  Visit&& visit) {
     for (int axis = 1; axis < 3; ++axis)
         if (box.lo[axis] > 0 || box.hi[axis] <= 0) return;
     const auto n = static_cast<std::int64_t>(t.is_odd ? t.n[0] : -t.n[0]); // at most 2^(2F)
-    cell_terms terms{n * (std::int64_t{1} << (cell_unit_bits - 2 * t.fraction - 1)), 0};
-    std::int64_t x = 0;
-    if (box.lo[0] > 0) {
-        x = box.lo[0] - 1;
-    } else if (box.hi[0] <= 0) {
-        x = box.hi[0];
-    } else {
+    const bool is_before = box.lo[0] > 0, is_behind = !is_before && box.hi[0] <= 0,
+               is_within = !is_before && !is_behind;
+    Terms terms{};
+    if constexpr (!OnlyCount && (has_moments<Terms> || has_areas<Terms>)) {
+        const std::int64_t corner[3] = {0, 0, 0};
+        if (is_within) add_parts(t, cutting_planes{}, whole_triangle(), corner, areas, terms);
+        if constexpr (has_moments<Terms>) { // of edges within the pixel these are rounded, unlike their covers
+            const pixel_sums row = pixel_cover<true>(t, 0, 0);
+            terms.cover_y = t.is_odd ? -row.y : row.y;
+            terms.cover_z = t.is_odd ? -row.z : row.z;
+        }
+    }
+    terms.cover = n * (std::int64_t{1} << (cell_unit_bits - 2 * t.fraction - 1));
+    if (is_within) {
         const std::int64_t depths = (std::int64_t{3} << t.fraction) - t.p[0][0] - t.p[1][0] - t.p[2][0];
         const double unit = core::bit_cast<double>(static_cast<std::uint64_t>(1023 - 3 * t.fraction) << 52); // 2^-3F
         terms.volume = round_to_cell_units(exact::div(exact::mul(exact::to_double(n * depths), unit), 6.0));
     }
-    visit(std::int64_t{0}, std::int64_t{0}, x, terms);
+    visit(std::int64_t{0}, std::int64_t{0}, is_before ? box.lo[0] - 1 : is_behind ? box.hi[0] : 0, terms);
 }
 
+// Calls visit(y, z, i, terms) for all voxels in which a part of a triangle lies, as for_each_cell_of_pixel. areas: what
+// area_terms need.
 VOXELPIPE_ANY_CALLABLE
-template <bool OnlyCount, class Int, class Visit>
-VOXELPIPE_HD void for_each_cell(const cell_triangle<Int>& t, const cell_box& box, Visit&& visit) {
+template <bool OnlyCount, class Terms = cell_terms, class Int, class Visit>
+VOXELPIPE_HD void for_each_cell(const cell_triangle<Int>& t, const cell_box& box, Visit&& visit,
+                                const area_ratio& areas = {0, 0.0}) {
     if (t.reach[0] == 1 && t.reach[1] == 1 && t.reach[2] == 1) {
-        visit_only_cell(t, box, visit);
+        visit_only_cell<OnlyCount, Terms>(t, box, areas, visit);
         return;
     }
     cutting_planes planes{};
@@ -302,7 +360,7 @@ VOXELPIPE_HD void for_each_cell(const cell_triangle<Int>& t, const cell_box& box
             }
             if (t.reach[1] > 1 || t.reach[2] > 1)
                 if (!meets_inside(t, planes, column)) continue;
-            for_each_cell_of_pixel<OnlyCount>(t, column, planes, box, j, k, visit);
+            for_each_cell_of_pixel<OnlyCount, Terms>(t, column, planes, box, areas, j, k, visit);
         }
     }
 }

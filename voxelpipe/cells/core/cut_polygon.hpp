@@ -32,6 +32,7 @@ struct cell_triangle {
     std::int64_t reach[3]; // one more than the highest voxel that the box meets with its inside, relative to `base`
     Int n[3];              // normal of the sorted vertices: (p1 - p0) x (p2 - p0)
     int fraction;          // F
+    int lifted;            // 1 or 2: the axis across which it lies in its voxels' upper faces; else 0 (lift)
     bool is_odd;
 };
 
@@ -81,6 +82,19 @@ template <class Int>
     t.n[1] = d(1, 2) * d(2, 0) - d(1, 0) * d(2, 2);
     t.n[2] = d(1, 0) * d(2, 1) - d(1, 1) * d(2, 0);
     return t;
+}
+
+// Takes a triangle in a lattice plane across y or z, which covers nothing, for the voxels below that plane: its area is
+// theirs. A triangle without area stays as it is.
+template <class Int>
+VOXELPIPE_HD void lift(cell_triangle<Int>& t) {
+    for (int axis = 1; axis < 3; ++axis) {
+        if (t.reach[axis] != 0 || t.n[axis] == 0) continue;
+        --t.base[axis];
+        ++t.reach[axis];
+        for (int v = 0; v < 3; ++v) t.p[v][axis] += std::int64_t{1} << t.fraction;
+        t.lifted = axis;
+    }
 }
 
 // The six cutting planes of a polygon: axis plane / 2, at its place in the triangle's units.

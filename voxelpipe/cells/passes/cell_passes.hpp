@@ -7,8 +7,10 @@
 #include <voxelpipe/cells/passes/cell_rows.hpp>
 #include <voxelpipe/programs/passes/fragment_pool.hpp>
 
+#include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -19,6 +21,16 @@ namespace voxelpipe::core {
 // (along the rows, the two other axes) of (x, y, z).
 [[nodiscard]] inline glm::ivec3 turn(const glm::ivec3& p, int axis) {
     return axis == 0 ? p : axis == 1 ? glm::ivec3(p.y, p.z, p.x) : glm::ivec3(p.z, p.x, p.y);
+}
+
+// The areas of a voxel's faces, along the rows and the two other axes.
+[[nodiscard]] inline cell_areas areas_of(const grid& g, int axis) {
+    const double side = std::ldexp(1.0, std::ilogb(std::max({g.voxel_size.x, g.voxel_size.y, g.voxel_size.z})));
+    cell_areas a{};
+    a.side = side;
+    for (int i = 0; i < 3; ++i)
+        a.face[i] = exact::mul(g.voxel_size[(axis + i + 1) % 3] / side, g.voxel_size[(axis + i + 2) % 3] / side);
+    return a;
 }
 
 // The triangles of a call, and what its passes count.
@@ -34,7 +46,8 @@ public:
     cell_scene(Backend& backend, std::span<const Draw> draws, const grid& g, int axis)
         : backend_(backend), counts_(backend, array_view<const std::uint64_t>(zeros.data(), zeros.size())),
           positions_(backend, num_vertices(draws)), triangles_(backend, num_triangles(draws)),
-          first_triangle_(backend, first_triangles(draws)), fraction_(g.fraction()), extent_(turn(g.extent, axis)) {
+          first_triangle_(backend, first_triangles(draws)), fraction_(g.fraction()), extent_(turn(g.extent, axis)),
+          areas_(areas_of(g, axis)) {
         const snap_transform snap = make_snap_transform(g);
         std::uint64_t first_vertex = 0, first_triangle = 0;
         for (std::size_t d = 0; d < draws.size(); ++d) {
@@ -61,7 +74,8 @@ public:
                 static_cast<std::uint32_t>(first_triangle_.size()),
                 static_cast<std::uint32_t>(triangles_.size()),
                 fraction_,
-                extent_};
+                extent_,
+                areas_};
     }
     [[nodiscard]] std::uint64_t* counts() { return counts_.data(); }
     [[nodiscard]] std::vector<std::uint64_t> read_counts() const { return counts_.to_host(backend_); }
@@ -110,6 +124,7 @@ private:
     buffer<std::uint64_t> first_triangle_;
     int fraction_;
     glm::ivec3 extent_;
+    cell_areas areas_;
 };
 
 // The status of a call that has succeeded, or what failed.
@@ -136,6 +151,7 @@ private:
     s.cells.below_zero = of(cell_count::below_zero);
     s.cells.above_one = of(cell_count::above_one);
     s.cells.cell_records = records;
+    s.cells.lost_centroids = of(cell_count::lost_centroids);
     uint128 volume = static_cast<uint128>(of(cell_count::volume_high)) << 64;
     volume += static_cast<uint128>(of(cell_count::volume_middle)) << 32;
     volume += of(cell_count::volume_low);
@@ -171,24 +187,27 @@ template <class Backend, class Mesh, class VertexShader, class CellShader, class
 
     using words = typename Backend::template buffer<std::uint32_t>;
     using numbers = typename Backend::template buffer<std::uint64_t>;
+    using terms_type = terms_of_needs<needs_of_cells<cell_fragment_of<CellShader>>>;
     numbers first_term(backend, triangles_in + 1);
     std::uint64_t count = 0;
     {
         words num_terms(backend, triangles_in + 1);
-        backend.for_each(triangles_in + 1, passes::count_cells{scene.mesh(), num_terms.data(), scene.counts()});
+        backend.for_each(triangles_in + 1,
+                         passes::count_cells<terms_type>{scene.mesh(), num_terms.data(), scene.counts()});
         count = backend.sum(num_terms, first_term);
     }
     if (finds_edges) scene.count_open_edges();
     if (count >= most) return fail(status_code::out_of_memory);
     numbers keys(backend, count);
     words order(backend, count);
-    typename Backend::template buffer<cell_terms> terms(backend, count);
-    backend.for_each(triangles_in, passes::list_cells{scene.mesh(), keys_of, first_term.data(), keys.data(),
-                                                      order.data(), terms.data()});
+    typename Backend::template buffer<terms_type> terms(backend, count);
+    backend.for_each(triangles_in, passes::list_cells<terms_type>{scene.mesh(), keys_of, first_term.data(), keys.data(),
+                                                                  order.data(), terms.data()});
     backend.sort_by_key(keys, order, static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys))));
-    const passes::record_list list{keys_of, keys.data(), order.data(), terms.data(), count};
+    const passes::record_list<terms_type> list{keys_of, keys.data(), order.data(), terms.data(), count};
     constexpr std::uint64_t safe = std::uint64_t{1} << 19; // triangles whose covers cannot wrap
-    backend.for_each(rows * keys_of.bodies, passes::measure_rows{list, triangles_in >= safe, scene.counts()});
+    backend.for_each(rows * keys_of.bodies,
+                     passes::measure_rows<terms_type>{list, triangles_in >= safe, scene.counts()});
     if (const status s = make_cell_status(scene.read_counts(), options, triangles_in, count); !s.ok()) return s;
 
     if (const status begun = begin_fold(backend, fb); !begun.ok()) return begun;
@@ -196,11 +215,11 @@ template <class Backend, class Mesh, class VertexShader, class CellShader, class
     for (const auto& d : draws) shaders.push_back(d.fragment_shader);
     const typename Backend::template buffer<CellShader> of_bodies(
         backend, array_view<const CellShader>(shaders.data(), shaders.size()));
-    typename Backend::template buffer<passes::cell_cursor> cursors(backend,
-                                                                   keys_of.bodies == 1 ? 0 : rows * keys_of.bodies);
+    typename Backend::template buffer<passes::cell_cursor<terms_type>> cursors(
+        backend, keys_of.bodies == 1 ? 0 : rows * keys_of.bodies);
     backend.for_each(rows, passes::shade_cells<CellShader, Targets...>{
-                               list, of_bodies.data(), keys_of.bodies == 1 ? nullptr : cursors.data(), fb, g.offset,
-                               options.axis, extent.x, scene.counts()});
+                               list, scene.mesh(), of_bodies.data(), keys_of.bodies == 1 ? nullptr : cursors.data(), fb,
+                               g.offset, options.axis, extent.x, scene.counts()});
     return make_cell_status(scene.read_counts(), options, triangles_in, count);
 }
 

@@ -2,31 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Terms of triangles, listed by row and voxel, and the rows that sum them. A row is one of a body: rows by ascending y,
-// then z, each with the bodies in order. In a row, slot 0 stands for all that lies before the grid, slot i + 1 for
-// voxel i, and the last slot for all behind. Functors for Backend::for_each, the same on every backend.
+// Passes that list the terms of triangles by row and voxel, look at the rows' sums, and shade their voxels. Functors
+// for Backend::for_each, the same on every backend.
 
-#include <voxelpipe/cells/passes/cell_source.hpp>
+#include <voxelpipe/cells/passes/cell_sums.hpp>
 #include <voxelpipe/framebuffer.hpp>
 
 #include <cstdint>
 
 namespace voxelpipe::core::passes {
 
-struct cell_keys {
-    std::uint64_t slots; // of a row: its voxels and two more
-    std::uint64_t rows_y;
-    std::uint64_t bodies; // 1, or the number of draws
-
-    [[nodiscard]] VOXELPIPE_HD std::uint64_t key(std::uint64_t y, std::uint64_t z, std::uint64_t body,
-                                                 std::uint64_t slot) const {
-        return ((z * rows_y + y) * bodies + body) * slots + slot;
-    }
-};
-
 // Classifies a triangle, and calls visit(y, z, slot, terms) for its terms.
 VOXELPIPE_ANY_CALLABLE
-template <bool OnlyCount, class Visit>
+template <bool OnlyCount, class Terms, class Visit>
 VOXELPIPE_HD triangle_class visit_cells(const cell_mesh& mesh, std::uint64_t i, Visit&& visit) {
     const snapped_position a = mesh.corner(i, 0), b = mesh.corner(i, 1), c = mesh.corner(i, 2);
     const triangle_class kind = classify_positions(a, b, c);
@@ -35,12 +23,20 @@ VOXELPIPE_HD triangle_class visit_cells(const cell_mesh& mesh, std::uint64_t i, 
     const voxel_box all = bounds(a, b, c, mesh.fraction);
     for (int axis = 1; axis < 3; ++axis)
         if (all.hi[axis] < 0 || all.lo[axis] >= extent[axis]) return triangle_class::outside;
-    const auto run = [&](const auto& t) {
+    const auto run = [&](auto t) {
+        area_ratio areas{0, 0.0};
+        if constexpr (has_areas<Terms>) {
+            lift(t);
+            if (!OnlyCount) areas = ratio_of(t, mesh.areas);
+        }
         const cell_box box = make_cell_box(t, extent);
-        for_each_cell<OnlyCount>(t, box, [&](std::int64_t y, std::int64_t z, std::int64_t x, const cell_terms& terms) {
-            visit(static_cast<std::uint64_t>(y - box.lo[1]), static_cast<std::uint64_t>(z - box.lo[2]),
-                  static_cast<std::uint64_t>(x - box.lo[0] + 1), terms);
-        });
+        for_each_cell<OnlyCount, Terms>(
+            t, box,
+            [&](std::int64_t y, std::int64_t z, std::int64_t x, const Terms& terms) {
+                visit(static_cast<std::uint64_t>(y - box.lo[1]), static_cast<std::uint64_t>(z - box.lo[2]),
+                      static_cast<std::uint64_t>(x - box.lo[0] + 1), terms);
+            },
+            areas);
     };
     if (is_narrow_cell(a, b, c, mesh.fraction))
         run(make_cell_triangle<std::int64_t>(a, b, c, mesh.fraction));
@@ -50,6 +46,7 @@ VOXELPIPE_HD triangle_class visit_cells(const cell_mesh& mesh, std::uint64_t i, 
 }
 
 // The number of a triangle's terms; 0 behind the last triangle, for the sums.
+template <class Terms>
 struct count_cells {
     cell_mesh mesh;
     std::uint32_t* num_terms;
@@ -60,7 +57,7 @@ struct count_cells {
         if (i == mesh.num_triangles) return;
         std::uint32_t n = 0;
         const triangle_class kind =
-            visit_cells<true>(mesh, i, [&](std::uint64_t, std::uint64_t, std::uint64_t, const cell_terms&) {
+            visit_cells<true, Terms>(mesh, i, [&](std::uint64_t, std::uint64_t, std::uint64_t, const Terms&) {
                 n += static_cast<std::uint32_t>(n != ~0u);
             });
         num_terms[i] = n;
@@ -70,77 +67,35 @@ struct count_cells {
     }
 };
 
+template <class Terms>
 struct list_cells {
     cell_mesh mesh;
     cell_keys keys_of;
     const std::uint64_t* first_term; // of each triangle
     std::uint64_t* keys;
     std::uint32_t* order;
-    cell_terms* terms;
+    Terms* terms;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         std::uint64_t to = first_term[i];
         if (first_term[i + 1] == to) return;
         const std::uint64_t body = keys_of.bodies == 1 ? 0 : find_owner(mesh.first_triangle, mesh.num_draws, i);
-        visit_cells<false>(mesh, i,
-                           [&](std::uint64_t y, std::uint64_t z, std::uint64_t slot, const cell_terms& of_voxel) {
-                               keys[to] = keys_of.key(y, z, body, slot);
-                               order[to] = static_cast<std::uint32_t>(to);
-                               terms[to] = of_voxel;
-                               ++to;
-                           });
-    }
-};
-
-// The sorted terms.
-struct record_list {
-    cell_keys keys_of;
-    const std::uint64_t* keys;
-    const std::uint32_t* order;
-    const cell_terms* terms;
-    std::uint64_t count;
-
-    // The first term whose key is not less.
-    [[nodiscard]] VOXELPIPE_HD std::uint64_t find(std::uint64_t key) const {
-        std::uint64_t lo = 0, hi = count;
-        while (lo < hi) {
-            const std::uint64_t middle = lo + (hi - lo) / 2;
-            if (keys[middle] < key)
-                lo = middle + 1;
-            else
-                hi = middle;
-        }
-        return lo;
-    }
-};
-
-// Goes along a row of a body, slot by slot.
-struct cell_cursor {
-    std::uint64_t at;       // the next term
-    std::uint64_t next_key; // of the next slot
-    std::int64_t aperture;  // s: the sum of covers before the voxel
-
-    // Adds up the terms of the next slot, in two's complement: sums may wrap on their way.
-    struct slot_sums {
-        std::uint64_t cover, volume;
-        bool has_any;
-    };
-    [[nodiscard]] VOXELPIPE_HD slot_sums take(const record_list& list) {
-        slot_sums s{0, 0, false};
-        for (; at < list.count && list.keys[at] == next_key; ++at) {
-            const cell_terms& t = list.terms[list.order[at]];
-            s.cover += static_cast<std::uint64_t>(t.cover);
-            s.volume += static_cast<std::uint64_t>(t.volume);
-            s.has_any = true;
-        }
-        ++next_key;
-        return s;
+        visit_cells<false, Terms>(mesh, i,
+                                  [&](std::uint64_t y, std::uint64_t z, std::uint64_t slot, const Terms& of_voxel) {
+                                      keys[to] = keys_of.key(y, z, body, slot);
+                                      order[to] = static_cast<std::uint32_t>(to);
+                                      terms[to] = of_voxel;
+                                      if constexpr (has_sheets<Terms>)
+                                          terms[to].triangle = static_cast<std::uint32_t>(i);
+                                      ++to;
+                                  });
     }
 };
 
 // Finds open rows, and rows whose sums might wrap. i: a row of a body.
+template <class Terms>
 struct measure_rows {
-    record_list list;
+    record_list<Terms> list;
     bool checks_size;
     std::uint64_t* counts;
 
@@ -165,9 +120,14 @@ struct measure_rows {
 // Shades the voxels of a row, and blends them. i: a row of the grid, with all its bodies.
 template <class CellShader, class... Targets>
 struct shade_cells {
-    record_list list;
+    using fragment = cell_fragment_of<CellShader>;
+    using terms_type = terms_of_needs<needs_of_cells<fragment>>;
+    using cursor = cell_cursor<terms_type>;
+
+    record_list<terms_type> list;
+    cell_mesh mesh;
     const CellShader* shaders; // one a body
-    cell_cursor* cursors;      // a row's bodies; null with one body
+    cursor* cursors;           // a row's bodies; null with one body
     framebuffer_view<Targets...> fb;
     glm::ivec3 offset;
     int axis, row_extent;
@@ -176,18 +136,18 @@ struct shade_cells {
     VOXELPIPE_ANY_CALLABLE
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         const std::uint64_t bodies = list.keys_of.bodies, row = i * bodies, slots = list.keys_of.slots;
-        cell_cursor one{};
-        cell_cursor* const all = cursors != nullptr ? cursors + row : &one;
+        cursor one{};
+        cursor* const all = cursors != nullptr ? cursors + row : &one;
         bool has_any = false;
         for (std::uint64_t b = 0; b < bodies; ++b) {
-            all[b] = {list.find((row + b) * slots), (row + b) * slots, 0};
+            all[b] = {list.find((row + b) * slots), (row + b) * slots, 0, 0, 0};
             const std::uint64_t at = all[b].at;
             has_any = has_any || (at < list.count && list.keys[at] < (row + b + 1) * slots);
             all[b].aperture = static_cast<std::int64_t>(all[b].take(list).cover);
         }
         if (!has_any) return;
         const auto u = static_cast<int>(i % list.keys_of.rows_y), v = static_cast<int>(i / list.keys_of.rows_y);
-        std::uint64_t cut = 0, below = 0, above = 0, fragments = 0, discarded = 0, voxels = 0;
+        std::uint64_t cut = 0, below = 0, above = 0, fragments = 0, discarded = 0, voxels = 0, lost = 0;
         int128 volume = 0;
         constexpr std::int64_t unit = std::int64_t{1} << cell_unit_bits, margin = std::int64_t{1} << 20;
         for (int w = 0; w < row_extent; ++w) {
@@ -207,8 +167,11 @@ struct shade_cells {
                 below += static_cast<std::uint64_t>(units < -margin);
                 above += static_cast<std::uint64_t>(units > unit + margin);
                 volume += units;
-                const auto out = shaders[b](cell_fragment{p + offset, static_cast<std::uint32_t>(b), sums.has_any,
-                                                          to_fraction(units), units, aperture, next});
+                fragment f{};
+                static_cast<cell_fragment&>(f) = {
+                    p + offset, static_cast<std::uint32_t>(b), sums.has_any, to_fraction(units), units, aperture, next};
+                lost += static_cast<std::uint64_t>(!measure_cell(mesh, list, axis, {w, u, v}, all[b].at, sums, f));
+                const auto out = shaders[b](f);
                 if (!out.keep) {
                     ++discarded;
                     continue;
@@ -227,6 +190,7 @@ struct shade_cells {
         add_count(counts, cell_count::fragments, fragments);
         add_count(counts, cell_count::discarded, discarded);
         add_count(counts, cell_count::voxels, voxels);
+        add_count(counts, cell_count::lost_centroids, lost);
         add_count(counts, cell_count::volume_low, static_cast<std::uint64_t>(volume) & 0xffffffffu);
         add_count(counts, cell_count::volume_middle, static_cast<std::uint64_t>(volume) >> 32);
         add_count(counts, cell_count::volume_high, static_cast<std::uint64_t>(volume >> 64));

@@ -33,6 +33,7 @@ enum class cell_count : std::uint8_t {
     volume_low,
     volume_middle,
     volume_high,
+    lost_centroids,
     size
 };
 [[nodiscard]] VOXELPIPE_HD constexpr std::size_t index_of(cell_count c) { return static_cast<std::size_t>(c); }
@@ -51,6 +52,7 @@ struct cell_mesh {
     std::uint32_t num_triangles;
     int fraction;
     glm::ivec3 extent; // turned, too
+    cell_areas areas;  // of the turned voxel
 
     [[nodiscard]] VOXELPIPE_HD snapped_position corner(std::uint64_t triangle, int i) const {
         const glm::uvec3& t = triangles[triangle];
