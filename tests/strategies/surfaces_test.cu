@@ -3,6 +3,7 @@
 
 // Surfaces on the device: the bytes and counters of cpu_backend.
 
+#include "../surfaces/slab_support.hpp"
 #include "../surfaces/value_support.hpp"
 
 #include <cpu_ref/backend.hpp>
@@ -93,6 +94,21 @@ TEST(DeviceSurfaces, EmbeddedOnesHaveTheBytesOfTheCpu) {
         rounds += remesh(gpu, m, g, {.embedded = true}).status.surface.embed_rounds;
     }
     EXPECT_GT(rounds, 0u);
+}
+
+TEST(DeviceSurfaces, SlabsHaveTheBytesOfTheWhole) {
+    vp::cuda_backend gpu;
+    std::mt19937 random(4);
+    const vp::grid g = grid_of(glm::ivec3(35, 5, 13));
+    const std::vector<float> values = slab_values<float>(random, g.extent, 0.4);
+    for (const vp::extract_options& o : {vp::extract_options{}, vp::extract_options{.quads = true}}) {
+        const host_surface whole = extract_field(gpu, values, g, o),
+                           joined = join_slabs<float>(gpu, values, g, {1, 5, 1, 6}, o);
+        EXPECT_TRUE(joined.status.ok());
+        EXPECT_EQ(joined.vertices, whole.vertices);
+        EXPECT_EQ(joined.triangles, whole.triangles);
+        EXPECT_EQ(joined.quads, whole.quads);
+    }
 }
 
 TEST(DeviceSurfaces, ValuesHaveTheBytesOfTheCpu) {
