@@ -75,7 +75,7 @@ private:
         if (a.high > b.low && b.high > a.low) return false;
         return a.low != a.high || b.low != b.high || a.low != b.low;
     }
-    // Of triangles in the plane with normal n: seen along an axis across which it does not lie.
+    // Whether triangles in the plane with normal n overlap: seen along an axis across which it does not lie.
     [[nodiscard]] VOXELPIPE_HD bool overlaps(const vector& n) const {
         const int drop = n[0] != 0 ? 0 : n[1] != 0 ? 1 : 2, j = drop == 0 ? 1 : 0, k = drop == 2 ? 1 : 2;
         for (int i = 0; i < 6; ++i) {

@@ -15,7 +15,7 @@ struct layer_begin {
     std::uint64_t vertex, edge;
 };
 
-// Of layer first + i * layers: what begins a range of layers, and what ends it.
+// Where layer first + i * layers begins: 0 for the begin of a range of layers, 1 for its end.
 struct find_layers {
     cell_list cells;
     std::uint64_t count; // of cells

@@ -104,7 +104,7 @@ private:
     }
 };
 
-// Of a vertex.
+// The place of a vertex on the whole lattice.
 [[nodiscard]] VOXELPIPE_HD inline lattice_vertex lattice_place(const surface_vertex& v) {
     return {std::int64_t{v.cell.x} * 65536 + v.q[0], std::int64_t{v.cell.y} * 65536 + v.q[1],
             std::int64_t{v.cell.z} * 65536 + v.q[2]};
