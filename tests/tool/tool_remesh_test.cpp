@@ -356,8 +356,8 @@ TEST(Remeshing, PlacesAndQuads) {
 TEST(Remeshing, EmbeddedMeshesDoNotIntersectThemselves) {
     const scratch_folder folder;
     write_obj(folder / "m.obj", surface_tests::needles(0));
-    const std::vector<std::string> arguments{folder / "m.obj", "--remesh", "-r", "13", "--report",
-                                             "--stats",        "json",     "-o", folder / "o.ply"};
+    const std::vector<std::string> arguments{
+        folder / "m.obj", "--remesh", "-r", "13", "--report", "--stats", "json", "-o", folder / "o.ply"};
     const outcome plain = run(folder, arguments);
     ASSERT_EQ(0, plain.code) << plain.err;
     EXPECT_EQ(std::string::npos, plain.err.find("intersect"));

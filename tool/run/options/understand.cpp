@@ -197,9 +197,10 @@ void understand_distance(command_line& options, const raw_options& raw) {
 }
 
 void understand_remesh(command_line& options, const raw_options& raw) {
-    const std::pair<const char*, bool> given[]{
-        {"--place", raw.place.has_value()}, {"--quads", raw.quads},
-                                               {"--embedded", raw.embedded}, {"--report", raw.report}};
+    const std::pair<const char*, bool> given[]{{"--place", raw.place.has_value()},
+                                               {"--quads", raw.quads},
+                                               {"--embedded", raw.embedded},
+                                               {"--report", raw.report}};
     if (!raw.remesh) {
         for (const auto& [name, is_given] : given)
             if (is_given) throw usage_error(std::string(name) + " goes with --remesh");
