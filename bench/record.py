@@ -34,7 +34,9 @@ REPORTS = {
     "gpu_computed.md": {"gpu_computed.csv": "computed.csv"},
     "gpu_primitives.md": {"gpu_primitives.csv": "primitives.csv"},
     "gpu_distance.md": {"gpu_distance.csv": "distance.csv"},
+    "gpu_surfaces.md": {"gpu_surfaces.csv": "surfaces.csv"},
     "cpu_sparse.md": {"cpu_sparse.csv": "sparse.csv"},
+    "cpu_surfaces.md": {"cpu_surfaces.csv": "surfaces.csv"},
     "cpu_processor_time.md": {"cpu_processor_time.csv": "processor_time.csv"},
     "cpu.md": {"cpu_scenes.csv": "table.csv", "cpu_stages.csv": "stages.csv", "cpu_published.csv": "published.csv"},
 }

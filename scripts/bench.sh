@@ -8,6 +8,7 @@
 #   scripts/bench.sh --gpu [OPTION...]       the GPU table (needs nvcc and a GPU)
 #   scripts/bench.sh --scaling [OPTION...]   the GPU's scaling curves, and plots of what is in build/bench-gpu/bench/results
 #   scripts/bench.sh --solids [OPTION...]    solids into bits on the GPU
+#   scripts/bench.sh --surfaces [OPTION...]  meshes of bits and of triangles on the GPU
 #   scripts/bench.sh --programs [OPTION...]  programs, instances, points and lines on the GPU
 #   scripts/bench.sh --sparse [OPTION...]    sparse framebuffers on the GPU
 #   scripts/bench.sh --computed [OPTION...]  shaders that compute, by strategy, on the GPU
@@ -57,7 +58,7 @@ case ${1:-} in
         "$gpu_folder/bench/gpu/bench_gpu_scaling" "${@:2}"
         plot "$results" "$results"
         ;;
-    --solids | --programs | --sparse | --computed)
+    --solids | --surfaces | --programs | --sparse | --computed)
         build_gpu "bench_gpu_${1#--}"
         "$gpu_folder/bench/gpu/bench_gpu_${1#--}" --out "$results" "${@:2}"
         ;;

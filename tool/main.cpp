@@ -48,6 +48,9 @@ void print(const command_line& options, const run_report& report) {
                 stream << c.components << (c.components == 1 ? " component" : " components")
                        << ", Euler characteristic " << report.surface->euler << ", " << c.made_crossings
                        << " made crossings, " << c.cone_crossings << " crossings on closed holes\n";
+            if (report.request.remesh->reports && report.request.remesh->embedded)
+                stream << c.intersecting_pairs << " pairs of triangles intersect; " << c.moved_vertices
+                       << " vertices were moved in " << c.embed_rounds << " rounds\n";
         } else if (!report.files.empty())
             stream << report.stats.voxels << " of " << extent.x << " x " << extent.y << " x " << extent.z
                    << (report.request.distance ? " samples lie in the band\n" : " voxels are covered\n");

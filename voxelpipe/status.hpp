@@ -138,6 +138,9 @@ struct surface_counters {
     std::uint64_t made_crossings = 0;      // edges without a crossing of mesh or field, crossed in their middle
     std::uint64_t nan_samples = 0;         // of a field, which are outside
     std::uint64_t nearest_values = 0;      // vertices with the values of the nearest triangle, for want of a crossing's
+    std::uint64_t embed_rounds = 0;        // of extract_options::embedded that moved vertices
+    std::uint64_t moved_vertices = 0;      // by these rounds, to the mean of their crossings
+    std::uint64_t intersecting_pairs = 0;  // of triangles that these rounds leave; 0 if none were looked for
 
     friend bool operator==(const surface_counters&, const surface_counters&) = default;
 };

@@ -31,6 +31,9 @@ nb::dict report_surface(const status& s) {
     d["made_crossings"] = s.surface.made_crossings;
     d["nan_samples"] = s.surface.nan_samples;
     d["nearest_values"] = s.surface.nearest_values;
+    d["embed_rounds"] = s.surface.embed_rounds;
+    d["moved_vertices"] = s.surface.moved_vertices;
+    d["intersecting_pairs"] = s.surface.intersecting_pairs;
     return d;
 }
 
@@ -168,8 +171,9 @@ nb::tuple remesh_parts(const position_array& positions, const triangle_array& tr
                        const std::vector<std::uint64_t>& first_triangles, const grid& g, const grid& world,
                        const std::string& sign, const std::string& repair_name, const std::string& bodies_name,
                        std::optional<std::uint64_t> max_hole_edges, int closing, const std::string& place_name,
-                       double level, bool quads, std::uint32_t min_component, const value_array<float>& vertex_floats,
-                       const value_array<float>& triangle_floats, const value_array<std::int64_t>& vertex_integers,
+                       double level, bool quads, std::uint32_t min_component, bool embedded,
+                       const value_array<float>& vertex_floats, const value_array<float>& triangle_floats,
+                       const value_array<std::int64_t>& vertex_integers,
                        const value_array<std::int64_t>& triangle_integers, unsigned threads) {
     const solid_options solid = solid_options_named(sign, "outer", repair_name, bodies_name, max_hole_edges, closing);
     remesh_options options;
@@ -182,6 +186,7 @@ nb::tuple remesh_parts(const position_array& positions, const triangle_array& tr
     options.level = level;
     options.quads = quads;
     options.min_component = min_component;
+    options.embedded = embedded;
     const mesh_view<> mesh = view_of(positions, triangles);
     const value_columns<float> floats(vertex_floats, triangle_floats);
     const value_columns<std::int64_t> integers(vertex_integers, triangle_integers);
@@ -214,16 +219,16 @@ nb::tuple remesh_parts(const position_array& positions, const triangle_array& tr
 }
 
 extract_options extract_options_named(const std::string& place_name, double level, bool open, bool quads,
-                                      std::uint32_t min_component) {
-    return {place_named(place_name), level, open ? border::open : border::closed, quads, min_component};
+                                      std::uint32_t min_component, bool embedded) {
+    return {place_named(place_name), level, open ? border::open : border::closed, quads, min_component, embedded};
 }
 
 // (nz, ny, nx) bytes that are 0 or not.
 nb::tuple extract_bits(const array<const std::uint8_t, 3>& values, const grid& g, const std::string& place_name,
-                       bool open, bool quads, std::uint32_t min_component, unsigned threads) {
+                       bool open, bool quads, std::uint32_t min_component, bool embedded, unsigned threads) {
     expect_shape(values, g, "the array");
     using bits = target<bit, blend::replace>;
-    const extract_options options = extract_options_named(place_name, 0.0, open, quads, min_component);
+    const extract_options options = extract_options_named(place_name, 0.0, open, quads, min_component, embedded);
     return made_surface(g, threads, [&](cpu_backend& backend, surface<cpu_backend>& made) {
         framebuffer<cpu_backend, bits> inside(backend, g.extent);
         const target_view<bits>& view = get<0>(inside.view().targets);
@@ -237,10 +242,10 @@ nb::tuple extract_bits(const array<const std::uint8_t, 3>& values, const grid& g
 }
 
 nb::tuple extract_field(const array<const float, 3>& values, const grid& g, const std::string& place_name, double level,
-                        bool open, bool quads, std::uint32_t min_component, unsigned threads) {
+                        bool open, bool quads, std::uint32_t min_component, bool embedded, unsigned threads) {
     expect_shape(values, g, "the array");
     using field = target<float, blend::replace>;
-    const extract_options options = extract_options_named(place_name, level, open, quads, min_component);
+    const extract_options options = extract_options_named(place_name, level, open, quads, min_component, embedded);
     return made_surface(g, threads, [&](cpu_backend& backend, surface<cpu_backend>& made) {
         // The view is of a target that could be written; extract reads it.
         const target_view<field> view{const_cast<float*>(values.data()), g.extent}; // NOLINT(*-const-cast)
@@ -254,12 +259,12 @@ void bind_remesh(nb::module_& m) {
     m.def("remesh", &remesh_parts, nb::arg("positions"), nb::arg("triangles"), nb::arg("first_triangles"),
           nb::arg("grid"), nb::arg("world"), nb::arg("sign"), nb::arg("repair"), nb::arg("bodies"),
           nb::arg("max_hole_edges").none(), nb::arg("closing"), nb::arg("place"), nb::arg("level"), nb::arg("quads"),
-          nb::arg("min_component"), nb::arg("vertex_floats"), nb::arg("triangle_floats"), nb::arg("vertex_integers"),
-          nb::arg("triangle_integers"), nb::arg("threads"));
+          nb::arg("min_component"), nb::arg("embedded"), nb::arg("vertex_floats"), nb::arg("triangle_floats"),
+          nb::arg("vertex_integers"), nb::arg("triangle_integers"), nb::arg("threads"));
     m.def("extract_bits", &extract_bits, nb::arg("values"), nb::arg("grid"), nb::arg("place"), nb::arg("open"),
-          nb::arg("quads"), nb::arg("min_component"), nb::arg("threads"));
+          nb::arg("quads"), nb::arg("min_component"), nb::arg("embedded"), nb::arg("threads"));
     m.def("extract_field", &extract_field, nb::arg("values"), nb::arg("grid"), nb::arg("place"), nb::arg("level"),
-          nb::arg("open"), nb::arg("quads"), nb::arg("min_component"), nb::arg("threads"));
+          nb::arg("open"), nb::arg("quads"), nb::arg("min_component"), nb::arg("embedded"), nb::arg("threads"));
 }
 
 } // namespace voxelpipe::python

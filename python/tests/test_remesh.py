@@ -132,6 +132,27 @@ def test_attributes_of_a_level_are_those_of_the_nearest_point():
     assert np.abs(between - vp.distance_at((positions, faces), vertices.astype(np.float32))).max() < 1e-5
 
 
+def test_embedded_moves_vertices_of_triangles_that_intersect():
+    dice = np.random.default_rng(0)
+    corners = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)])
+    faces = np.array([(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)])
+    parts = [corners * dice.uniform(0.02, 0.3, 3) + dice.uniform(0.2, 0.8, 3) for _ in range(40)]
+    mesh = (np.concatenate(parts).astype(np.float32), np.concatenate([faces + 6 * i for i in range(40)]))
+    grid = vp.fit(mesh, 13)
+    counts = {}
+    plain = vp.remesh(mesh, grid, status=counts)
+    assert (counts["embed_rounds"], counts["moved_vertices"], counts["intersecting_pairs"]) == (0, 0, 0)
+    embedded = vp.remesh(mesh, grid, embedded=True, status=counts)
+    assert counts["embed_rounds"] > 0 and counts["intersecting_pairs"] == 0
+    changed = (plain[0] != embedded[0]).any(1).sum()
+    assert 0 < changed <= counts["moved_vertices"]
+    inside = dice.random(grid.shape) < 0.4
+    vp.extract(inside, grid, embedded=True, status=counts)
+    assert counts["embed_rounds"] == counts["intersecting_pairs"] == 0
+    vp.extract(np.where(inside, -1.0, 0.5).astype(np.float32), grid, embedded=True, status=counts)
+    assert counts["intersecting_pairs"] == 0
+
+
 def test_bad_attributes():
     positions, faces = sphere()
     grid = vp.fit((positions, faces), 8)

@@ -69,6 +69,7 @@ def remesh(
     level: float = 0.0,
     quads: bool = False,
     min_component: int = 0,
+    embedded: bool = False,
     attributes: Mapping[str, Any] | None = None,
     per: Mapping[str, Per] | None = None,
     threads: int = 0,
@@ -86,6 +87,8 @@ def remesh(
             a closed plate of twice the level.
         quads: (m, 4) in place of (m, 3).
         min_component: components of fewer vertices are left out.
+        embedded: triangles that intersect each other are looked for, and their vertices moved to the mean of their cell's
+            crossings, until no two intersect or all that do are there; `intersecting_pairs` counts what is left.
         attributes: for each name an array with a row for each vertex, which is interpolated (integers are taken from the
             triangle's first vertex), or for each triangle. A vertex of the result gets the mean of the mesh's floats and
             uint8 where the mesh crosses the edges of its cell, and the integer that most of these places have, of several
@@ -95,8 +98,8 @@ def remesh(
         per: by name, "vertex" or "triangle", for a mesh that has as many vertices as triangles.
         threads: 0 takes all cores. The result is the same for any number.
         status: a dict that is filled with the call's counters: those of solid(), components, made_crossings (edges that the
-            mesh does not cross, crossed in their middle: 0 for a closed mesh), cone_crossings and nearest_values (vertices
-            with the attributes of the nearest triangle) among them.
+            mesh does not cross, crossed in their middle: 0 for a closed mesh), cone_crossings, nearest_values (vertices with
+            the attributes of the nearest triangle), embed_rounds, moved_vertices and intersecting_pairs among them.
 
     Returns vertices, float64 (n, 3), in world units; faces, uint32 (m, 3), int64 for torch, counter-clockwise seen from
     outside; and a dict with `cell` (n, 3), the index (x, y, z) of the lowest sample of each vertex's cell, `sheet` (n), and
@@ -143,6 +146,7 @@ def remesh(
             float(level),
             quads,
             min_component,
+            bool(embedded),
             *arrays,
             threads,
         )
@@ -170,6 +174,7 @@ def extract(
     border: Border = "closed",
     quads: bool = False,
     min_component: int = 0,
+    embedded: bool = False,
     threads: int = 0,
     status: dict[str, int] | None = None,
 ) -> Any:
@@ -183,7 +188,7 @@ def extract(
             voxels. "sharp" has no planes here, and is "mean".
         level: of floats.
         border: "closed": what lies beyond the grid is outside; "open": faces that reach there are left out.
-        quads, min_component, threads, status: as in remesh().
+        quads, min_component, embedded, threads, status: as in remesh().
 
     Returns vertices, faces and a dict as remesh() does, with a `source` of -1. Raises ValueError for values of another
     shape than the grid, TypeError for values that are neither bool nor floats.
@@ -199,12 +204,13 @@ def extract(
     if array.dtype == np.bool_:
         if level != 0:
             raise ValueError("bool values have no level")
-        made = _core.extract_bits(
-            np.ascontiguousarray(array).view(np.uint8), grid, place, border == "open", quads, min_component, threads
-        )
+        inside = np.ascontiguousarray(array).view(np.uint8)
+        made = _core.extract_bits(inside, grid, place, border == "open", quads, min_component, bool(embedded), threads)
     elif np.issubdtype(array.dtype, np.floating):
         field = np.ascontiguousarray(array, np.float32)
-        made = _core.extract_field(field, grid, place, float(level), border == "open", quads, min_component, threads)
+        made = _core.extract_field(
+            field, grid, place, float(level), border == "open", quads, min_component, bool(embedded), threads
+        )
     else:
         raise TypeError(f"values are bool, which voxels are inside, or floats, not {array.dtype}")
     vertices, faces, cell, sheet, _, counts = made

@@ -3,6 +3,7 @@
 
 // Surfaces on the device: the bytes and counters of cpu_backend.
 
+#include "../surfaces/slab_support.hpp"
 #include "../surfaces/value_support.hpp"
 
 #include <cpu_ref/backend.hpp>
@@ -39,7 +40,7 @@ TEST(DeviceSurfaces, OfBitsHaveTheBytesOfTheCpu) {
         const bit_volume v = random_volume(random, glm::ivec3(3 + 9 * (k % 5), 4 + k, 7), 0.3 + 0.04 * k);
         for (const vp::extract_options& o :
              {vp::extract_options{}, vp::extract_options{.place = vp::place::corner, .quads = true},
-              vp::extract_options{.border = vp::border::open, .min_component = 12}}) {
+              vp::extract_options{.border = vp::border::open, .min_component = 12, .embedded = true}}) {
             const host_surface a = extract_bits(gpu, v, o), b = extract_bits(cpu, v, o);
             EXPECT_TRUE(a.status.ok());
             EXPECT_TRUE(a.has_same_arrays(b)) << k;
@@ -77,7 +78,36 @@ TEST(DeviceSurfaces, OfBadModelsHaveTheBytesOfTheCpu) {
             expect_same(m, g, {.place = vp::place::corner, .repair = vp::repair::vote});
             expect_same(m, g, {.sample = vp::sample::corner, .bodies = vp::bodies::draw});
             expect_same(m, g, {.level = 0.05});
+            expect_same(m, g, {.min_component = 9, .embedded = true});
         }
+    }
+}
+
+TEST(DeviceSurfaces, EmbeddedOnesHaveTheBytesOfTheCpu) {
+    std::uint64_t rounds = 0;
+    for (std::uint32_t seed = 0; seed < 2; ++seed) {
+        const host_mesh m = needles(seed);
+        const vp::grid g = grid_around_models(glm::ivec3(13, 12, 14));
+        expect_same(m, g, {.embedded = true});
+        expect_same(m, g, {.quads = true, .embedded = true});
+        vp::cuda_backend gpu;
+        rounds += remesh(gpu, m, g, {.embedded = true}).status.surface.embed_rounds;
+    }
+    EXPECT_GT(rounds, 0u);
+}
+
+TEST(DeviceSurfaces, SlabsHaveTheBytesOfTheWhole) {
+    vp::cuda_backend gpu;
+    std::mt19937 random(4);
+    const vp::grid g = grid_of(glm::ivec3(35, 5, 13));
+    const std::vector<float> values = slab_values<float>(random, g.extent, 0.4);
+    for (const vp::extract_options& o : {vp::extract_options{}, vp::extract_options{.quads = true}}) {
+        const host_surface whole = extract_field(gpu, values, g, o),
+                           joined = join_slabs<float>(gpu, values, g, {1, 5, 1, 6}, o);
+        EXPECT_TRUE(joined.status.ok());
+        EXPECT_EQ(joined.vertices, whole.vertices);
+        EXPECT_EQ(joined.triangles, whole.triangles);
+        EXPECT_EQ(joined.quads, whole.quads);
     }
 }
 

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // remesh: bad meshes become closed manifolds, crossings are exact, creases and corners are kept, signs are those of
-// solids. VOXELPIPE_TEST_SCALE (environment variable) above 1 takes as many times more bad models.
+// solids. VOXELPIPE_TEST_SCALE (environment variable) from 20 on takes
+// all bad models, on all grids.
 #include "surface_support.hpp"
 
 #include <cpu_ref/backend.hpp>
@@ -22,33 +23,52 @@ using namespace surface_tests;
 
 vp::grid unit_grid(int n) { return vp::fit(vp::bounding_box{glm::dvec3(0.0), glm::dvec3(1.0)}, glm::ivec3(n)); }
 
+// The signs that remesh takes, and a level.
+std::vector<vp::remesh_options> ways() {
+    using options = vp::remesh_options;
+    return {options{},
+            options{.rule = vp::fill_rule::even_odd},
+            options{.rule = vp::fill_rule::positive},
+            options{.repair = vp::repair::close_holes},
+            options{.repair = vp::repair::exterior},
+            options{.repair = vp::repair::exterior, .closing = 1},
+            options{.repair = vp::repair::vote},
+            options{.level = 0.04}};
+}
+
+// 1,000 models by each sign, at each place, on grids of 32 and 64 a side: by default a twentieth of the models, each
+// by every sign at one place on one grid.
 TEST(Remesh, BadModelsBecomeClosedManifolds) {
     const char* const scale = std::getenv("VOXELPIPE_TEST_SCALE");
-    const auto models = static_cast<std::uint32_t>(30 * (scale != nullptr ? std::max(1, std::atoi(scale)) : 1));
+    const int times = scale != nullptr ? std::max(1, std::atoi(scale)) : 1;
+    const bool is_whole = times >= 20;
     vp::cpu_backend backend{2};
-    std::uint64_t faces = 0, made = 0, cones = 0;
-    for (std::uint32_t seed = 0; seed < models; ++seed) {
+    std::uint64_t faces = 0, made = 0, cones = 0, moved = 0;
+    for (std::uint32_t seed = 0; seed < 50 * static_cast<std::uint32_t>(times); ++seed) {
         const host_mesh m = bad_model(seed);
-        const int n = seed % 10 == 0 ? 48 : 20;
-        for (int how = 0; how < 7; ++how) {
-            vp::remesh_options o;
-            o.place = static_cast<vp::place>((seed + static_cast<std::uint32_t>(how)) % 3);
-            if (how == 1) o.rule = vp::fill_rule::even_odd;
-            if (how == 2) o.rule = vp::fill_rule::positive;
-            if (how == 3) o.repair = vp::repair::close_holes;
-            if (how == 4) o.repair = vp::repair::exterior;
-            if (how == 5) o.repair = vp::repair::vote;
-            if (how == 6) o.level = 0.04;
-            const host_surface s = remesh(backend, m, unit_grid(n), o);
-            ASSERT_TRUE(s.is_closed_manifold()) << "model " << seed << ", way " << how << ": " << s.status.message();
-            faces += s.triangles.size();
-            made += s.status.surface.made_crossings;
-            cones += s.status.surface.cone_crossings;
+        std::uint32_t way = 0;
+        for (vp::remesh_options o : ways()) {
+            ++way;
+            for (std::uint32_t place = 0; place < 3; ++place)
+                for (const int n : {32, 64}) {
+                    if (!is_whole && (place != (seed + way) % 3 || (n == 64) != (seed % 8 == 0))) continue;
+                    o.place = static_cast<vp::place>(place);
+                    o.embedded = o.place == vp::place::sharp;
+                    const host_surface s = remesh(backend, m, unit_grid(n), o);
+                    ASSERT_TRUE(s.is_closed_manifold()) << "model " << seed << ", way " << way << ", place " << place
+                                                        << ", grid " << n << ": " << s.status.message();
+                    ASSERT_EQ(s.status.surface.intersecting_pairs, 0u) << "model " << seed << ", way " << way;
+                    faces += s.triangles.size();
+                    made += s.status.surface.made_crossings;
+                    cones += s.status.surface.cone_crossings;
+                    moved += s.status.surface.moved_vertices;
+                }
         }
     }
     EXPECT_GT(faces, 50000u);
     EXPECT_GT(made, 0u);
     EXPECT_GT(cones, 0u);
+    EXPECT_GT(moved, 0u);
 }
 
 // Every crossing against integers of this test: which triangle the edge meets, and where.

@@ -195,6 +195,24 @@ template <class Backend>
     return m;
 }
 
+// Thin parts that cross and share cells: sharp vertices of theirs lie on the wrong sides of each other.
+[[nodiscard]] inline host_mesh needles(std::uint32_t seed) {
+    std::mt19937 random(seed);
+    const auto real = [&](float low, float high) {
+        return low + (high - low) * static_cast<float>(random() % 4096) / 4096.0f;
+    };
+    host_mesh m;
+    for (int i = 0; i < 12; ++i) {
+        host_mesh part = octahedron(glm::vec3(0.0f), 1.0f);
+        const float x = real(0.2f, 0.8f), y = real(0.2f, 0.8f), z = real(0.2f, 0.8f);
+        const float rx = real(0.02f, 0.3f), ry = real(0.02f, 0.3f), rz = real(0.02f, 0.3f), shear = real(-1.0f, 1.0f);
+        for (glm::vec3& p : part.positions)
+            p = glm::vec3(x + rx * p.x + shear * ry * p.y, y + ry * p.y, z + rz * p.z + shear * rx * p.x);
+        m.add(part);
+    }
+    return m;
+}
+
 // A mesh with the faults that people bring: triangles deleted, flipped, doubled, cut beside their edges; parts that
 // cross; sheets; plates of no thickness; nested shells; slivers; NaN; far coordinates. In a cube of side 1.
 [[nodiscard]] inline host_mesh bad_model(std::uint32_t seed) {

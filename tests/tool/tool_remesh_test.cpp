@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // --remesh: closed meshes in every format, where their vertices lie, what is reported, and what is refused.
 #include "../surfaces/mesh_judge.hpp"
+#include "../surfaces/surface_support.hpp"
 #include "tool_scenes.hpp"
 #include "tool_test.hpp"
 
@@ -14,6 +15,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <map>
 #include <set>
 #include <sstream>
@@ -36,6 +38,12 @@ void write_crossing_boxes(const std::string& path) {
         file.mesh({{"POSITION", file.accessor(positions, "VEC3")}})["indices"] = index_accessor;
     }
     file.write_glb(path);
+}
+
+void write_obj(const std::string& path, const surface_tests::host_mesh& m) {
+    std::ofstream file(path);
+    for (const glm::vec3& p : m.positions) file << "v " << p.x << ' ' << p.y << ' ' << p.z << '\n';
+    for (const glm::uvec3& t : m.triangles) file << "f " << t.x + 1 << ' ' << t.y + 1 << ' ' << t.z + 1 << '\n';
 }
 
 struct read_surface {
@@ -344,6 +352,38 @@ TEST(Remeshing, PlacesAndQuads) {
     EXPECT_EQ(4, std::count(face.begin(), std::find(face.begin(), face.end(), '\n'), ' '));
 }
 
+// Sharp vertices of thin crossing parts lie on the wrong sides of each other.
+TEST(Remeshing, EmbeddedMeshesDoNotIntersectThemselves) {
+    const scratch_folder folder;
+    write_obj(folder / "m.obj", surface_tests::needles(0));
+    const std::vector<std::string> arguments{
+        folder / "m.obj", "--remesh", "-r", "13", "--report", "--stats", "json", "-o", folder / "o.ply"};
+    const outcome plain = run(folder, arguments);
+    ASSERT_EQ(0, plain.code) << plain.err;
+    EXPECT_EQ(std::string::npos, plain.err.find("intersect"));
+    EXPECT_FALSE(json::parse(plain.out)["remesh"].contains("embedded"));
+    const read_surface before = read_surface_ply(folder / "o.ply");
+    std::vector<std::string> more = arguments;
+    more.emplace_back("--embedded");
+    const outcome result = run(folder, more);
+    ASSERT_EQ(0, result.code) << result.err;
+    const json counts = json::parse(result.out)["remesh"]["embedded"];
+    EXPECT_EQ(0, counts["intersecting_pairs"]);
+    EXPECT_LT(0, counts["moved_vertices"]);
+    EXPECT_LT(0, counts["rounds"]);
+    const std::string line = "0 pairs of triangles intersect; " + counts["moved_vertices"].dump() +
+                             " vertices were moved in " + counts["rounds"].dump() + " rounds\n";
+    EXPECT_NE(std::string::npos, result.err.find(line)) << result.err;
+    const read_surface after = read_surface_ply(folder / "o.ply");
+    EXPECT_TRUE(after.is_closed());
+    ASSERT_EQ(before.vertices.size(), after.vertices.size());
+    std::uint64_t moved = 0;
+    for (std::size_t v = 0; v < after.vertices.size(); ++v)
+        if (after.vertices[v] != before.vertices[v]) ++moved;
+    EXPECT_LT(0U, moved);
+    EXPECT_LE(moved, counts["moved_vertices"].get<std::uint64_t>());
+}
+
 TEST(Remeshing, LevelsGrowTheModel) {
     const scratch_folder folder;
     write_crossing_boxes(folder / "m.glb");
@@ -385,6 +425,7 @@ TEST(Remeshing, WhatDoesNotGoTogetherIsRefused) {
     is_refused({"--place", "mean"}, "--place goes with --remesh");
     is_refused({"--quads"}, "--quads goes with --remesh");
     is_refused({"--report"}, "--report goes with --remesh");
+    is_refused({"--embedded"}, "--embedded goes with --remesh");
     is_refused({"--iso", "1"}, "--iso goes with --distance or --remesh");
     is_refused({"--remesh", "--place", "middle"}, "--place takes");
     is_refused({"--remesh"}, "--remesh makes a mesh", 1, "o.npy");

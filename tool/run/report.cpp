@@ -198,6 +198,10 @@ void print_json(std::ostream& stream, const run_report& report) {
                           {"euler", report.surface->euler},
                           {"made_crossings", c.made_crossings},
                           {"cone_crossings", c.cone_crossings}};
+        if (report.request.remesh->embedded)
+            root["remesh"]["embedded"] = {{"rounds", c.embed_rounds},
+                                          {"moved_vertices", c.moved_vertices},
+                                          {"intersecting_pairs", c.intersecting_pairs}};
         if (report.stats.solid) root["remesh"]["open_rows"] = report.stats.solid->open_rows;
     }
     if (const auto& counts = report.stats.fractions; counts)

@@ -39,12 +39,13 @@ struct remesh_options {
     voxelpipe::border border = voxelpipe::border::closed; // at the faces of the grid
     bool quads = false;                                   // quads in place of triangles
     std::uint32_t min_component = 0;                      // components of fewer vertices are left out
+    bool embedded = false; // triangles that intersect each other are undone, as with extract_options::embedded
 };
 
 namespace core {
 
 [[nodiscard]] inline extract_options extract_options_of(const remesh_options& o) {
-    return {o.place, o.level, o.border, o.quads, o.min_component};
+    return {o.place, o.level, o.border, o.quads, o.min_component, o.embedded};
 }
 [[nodiscard]] inline solid_options sign_options(const remesh_options& o) {
     solid_options s;

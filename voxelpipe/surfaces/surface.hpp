@@ -38,6 +38,10 @@ struct extract_options {
     voxelpipe::border border = voxelpipe::border::closed; // at the faces of the grid
     bool quads = false;                                   // quads in place of triangles
     std::uint32_t min_component = 0;                      // components of fewer vertices are left out
+    // Vertices of triangles that intersect each other are moved to the mean of their crossings, as place::mean has
+    // them, in rounds, until no two intersect or all that do are there: surface_counters::intersecting_pairs says how
+    // many are left. Quads count as the triangles that they would be cut into; parts that are left out count too.
+    bool embedded = false;
 };
 
 // A vertex: its cell, and its place there. No two vertices of different cells coincide.

@@ -71,6 +71,7 @@ vp::remesh_options remesh_options_of(const remesh_request& request) {
     options.max_hole_edges = solid.max_hole_edges;
     options.level = request.level;
     options.quads = request.quads;
+    options.embedded = request.embedded;
     return options;
 }
 

@@ -270,8 +270,13 @@ void describe_remesh(CLI::App& app, raw_options& raw) {
         ->option_text("WHERE")
         ->group("Remeshing");
     app.add_flag("--quads", raw.quads, "Quads, where the format has them: .obj, .ply and .npz")->group("Remeshing");
+    app.add_flag("--embedded", raw.embedded,
+                 "Move the vertices of triangles that intersect each other to the mean of their crossings, until none "
+                 "intersect or all that do are there")
+        ->group("Remeshing");
     app.add_flag("--report", raw.report,
-                 "Print the mesh's components, its Euler characteristic, and how many crossings were made up")
+                 "Print the mesh's components, its Euler characteristic, how many crossings were made up, and with "
+                 "--embedded what it did")
         ->group("Remeshing");
 }
 

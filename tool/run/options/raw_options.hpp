@@ -34,6 +34,7 @@ struct raw_options {
     bool remesh = false;
     std::optional<voxelpipe::place> place;
     bool quads = false;
+    bool embedded = false;
     bool report = false;
     std::optional<double> threshold;
     std::vector<std::string> targets;

@@ -197,8 +197,10 @@ void understand_distance(command_line& options, const raw_options& raw) {
 }
 
 void understand_remesh(command_line& options, const raw_options& raw) {
-    const std::pair<const char*, bool> given[]{
-        {"--place", raw.place.has_value()}, {"--quads", raw.quads}, {"--report", raw.report}};
+    const std::pair<const char*, bool> given[]{{"--place", raw.place.has_value()},
+                                               {"--quads", raw.quads},
+                                               {"--embedded", raw.embedded},
+                                               {"--report", raw.report}};
     if (!raw.remesh) {
         for (const auto& [name, is_given] : given)
             if (is_given) throw usage_error(std::string(name) + " goes with --remesh");
@@ -227,6 +229,7 @@ void understand_remesh(command_line& options, const raw_options& raw) {
     remesh.place = raw.place.value_or(voxelpipe::place::sharp);
     remesh.level = raw.iso.value_or(0);
     remesh.quads = raw.quads;
+    remesh.embedded = raw.embedded;
     remesh.reports = raw.report;
 }
 

@@ -5,6 +5,7 @@
 // From the bits of samples to a surface: cells, flips, vertices, quads, components, triangles. The same passes on every
 // backend.
 
+#include <voxelpipe/surfaces/passes/embed.hpp>
 #include <voxelpipe/surfaces/passes/parts.hpp>
 #include <voxelpipe/surfaces/passes/vertices.hpp>
 #include <voxelpipe/voxelize.hpp>
@@ -122,6 +123,34 @@ void choose_parts(Backend& backend, const extract_options& options, surface<Back
     out.sources = std::move(sources);
 }
 
+// Moves vertices of triangles that intersect to the mean, round by round.
+template <class Backend>
+void embed(Backend& backend, const surface_cells<Backend>& cells, const edge_crossing* crossings, place where,
+           surface<Backend>& out, surface_counters& counts) {
+    using numbers = typename Backend::template buffer<std::uint64_t>;
+    typename Backend::template buffer<glm::uvec3> triangles(backend, 2 * out.quads.size());
+    typename Backend::template buffer<std::uint32_t> marks(backend, out.vertices.size());
+    numbers found(backend, static_cast<std::size_t>(passes::embed_count::count));
+    std::uint64_t* const pairs = found.data() + static_cast<std::size_t>(passes::embed_count::pairs);
+    std::uint64_t* const moved = found.data() + static_cast<std::size_t>(passes::embed_count::moved);
+    backend.for_each(marks.size(), passes::start_marks{marks.data(), where == place::mean});
+    for (;;) {
+        backend.for_each(found.size(), passes::clear_counts{found.data()});
+        backend.for_each(out.quads.size(), passes::cut_quads{out.vertices.data(), out.quads.data(),
+                                                             where == place::sharp, triangles.data()});
+        backend.for_each(cells.count(),
+                         passes::find_pairs{cells.list(), out.vertices.data(), triangles.data(), marks.data(), pairs});
+        const passes::place_vertices means{cells.list(), place::mean, crossings, out.vertices.data(), nullptr, nullptr};
+        backend.for_each(cells.count(), passes::move_to_mean{means, marks.data(), moved});
+        const std::vector<std::uint64_t> host = found.to_host(backend);
+        counts.intersecting_pairs = host[static_cast<std::size_t>(passes::embed_count::pairs)];
+        const std::uint64_t moved_now = host[static_cast<std::size_t>(passes::embed_count::moved)];
+        if (moved_now == 0) return;
+        counts.moved_vertices += moved_now;
+        ++counts.embed_rounds;
+    }
+}
+
 // The surface of cells whose crossings are known; null: all in the middle of their edges. primitives: of the crossings'
 // triangles; null: vertices have no sources. Returns what the call returns, `result` with the surface's counts.
 template <class Backend>
@@ -137,6 +166,7 @@ template <class Backend>
     backend.for_each(cells.count(), passes::place_vertices{cells.list(), options.place, crossings, made.vertices.data(),
                                                            primitives, made.sources.data()});
     backend.for_each(cells.count(), passes::list_quads{cells.list(), made.quads.data()});
+    if (options.embedded) embed(backend, cells, crossings, options.place, made, result.surface);
     choose_parts(backend, options, made, result.surface);
     result.surface.vertices = made.vertices.size();
     result.surface.faces = made.quads.size();

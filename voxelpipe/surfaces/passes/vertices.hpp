@@ -30,24 +30,32 @@ struct place_vertices {
         const cell_sheets sheets = cells.sheets(cell);
         for (int s = 0; s < sheets.count(); ++s) {
             const std::uint64_t v = cells.first_vertices[cell] + static_cast<std::uint64_t>(s);
-            sheet_points points;
             std::uint32_t source = ~std::uint32_t{0};
-            for (int e = 0; e < 12; ++e) {
-                if (sheets.of_edge(e) != s) continue;
-                const edge_crossing c = crossing(at, e);
-                points.add(e >> 2, edge_corner(e), c);
-                if (primitives != nullptr && c.triangle != edge_crossing::no_triangle &&
-                    source > primitives[c.triangle])
-                    source = primitives[c.triangle];
-            }
-            const cell_place q = where == voxelpipe::place::corner ? cell_place{{{32768, 32768, 32768}}}
-                                 : where == voxelpipe::place::mean ? points.mean()
-                                                                   : points.sharp();
-            vertices[v] = {glm::ivec3(at.x() - 1, at.y() - 1, at.z() - 1),
-                           {q.q[0], q.q[1], q.q[2]},
-                           static_cast<std::uint16_t>(s)};
+            const sheet_points points = points_of(at, sheets, s, source);
+            vertices[v] = {glm::ivec3(at.x() - 1, at.y() - 1, at.z() - 1), {0, 0, 0}, static_cast<std::uint16_t>(s)};
+            store(v, points);
             if (primitives != nullptr) sources[v] = source;
         }
+    }
+    // The crossings of sheet s; `source` becomes the lowest primitive of theirs, if that is lower.
+    [[nodiscard]] VOXELPIPE_HD sheet_points points_of(const cell_key& at, const cell_sheets& sheets, int s,
+                                                      std::uint32_t& source) const {
+        sheet_points points;
+        for (int e = 0; e < 12; ++e) {
+            if (sheets.of_edge(e) != s) continue;
+            const edge_crossing c = crossing(at, e);
+            points.add(e >> 2, edge_corner(e), c);
+            if (primitives != nullptr && c.triangle != edge_crossing::no_triangle && source > primitives[c.triangle])
+                source = primitives[c.triangle];
+        }
+        return points;
+    }
+    // The place of vertex v.
+    VOXELPIPE_HD void store(std::uint64_t v, const sheet_points& points) const {
+        const cell_place q = where == voxelpipe::place::corner ? cell_place{{{32768, 32768, 32768}}}
+                             : where == voxelpipe::place::mean ? points.mean()
+                                                               : points.sharp();
+        for (int a = 0; a < 3; ++a) vertices[v].q[a] = q.q[a];
     }
     // The crossing of an edge of a cell.
     [[nodiscard]] VOXELPIPE_HD edge_crossing crossing(const cell_key& at, int e) const {
@@ -96,6 +104,12 @@ private:
     }
 };
 
+// The place of a vertex on the whole lattice.
+[[nodiscard]] VOXELPIPE_HD inline lattice_vertex lattice_place(const surface_vertex& v) {
+    return {std::int64_t{v.cell.x} * 65536 + v.q[0], std::int64_t{v.cell.y} * 65536 + v.q[1],
+            std::int64_t{v.cell.z} * 65536 + v.q[2]};
+}
+
 // The two triangles of quad i.
 struct cut_quads {
     const surface_vertex* vertices;
@@ -115,11 +129,7 @@ struct cut_quads {
     }
 
 private:
-    [[nodiscard]] VOXELPIPE_HD lattice_vertex at(std::uint32_t v) const {
-        const surface_vertex& s = vertices[v];
-        return {std::int64_t{s.cell.x} * 65536 + s.q[0], std::int64_t{s.cell.y} * 65536 + s.q[1],
-                std::int64_t{s.cell.z} * 65536 + s.q[2]};
-    }
+    [[nodiscard]] VOXELPIPE_HD lattice_vertex at(std::uint32_t v) const { return lattice_place(vertices[v]); }
 };
 
 } // namespace voxelpipe::core::passes

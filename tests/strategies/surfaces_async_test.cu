@@ -1,0 +1,176 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// extract_async: the bytes of extract in the caller's memory, replayed by a graph; and what it says of room that is
+// too small.
+
+#include "../surfaces/surface_support.hpp"
+
+#include <voxelpipe/surfaces/device/extract_async.cuh>
+#include <voxelpipe/voxelpipe.hpp>
+
+#include <gtest/gtest.h>
+
+using namespace surface_tests;
+
+namespace {
+
+using bits = vp::target<vp::bit, vp::blend::replace>;
+using field = vp::target<float, vp::blend::replace>;
+
+// A workspace, filled with a byte.
+struct workspace {
+    vp::cuda_backend::buffer<std::uint8_t> memory;
+    vp::surface_workspace_view view;
+
+    template <class View>
+    workspace(vp::cuda_backend& gpu, const View& from, const vp::extract_options& o, const vp::surface_limits& limits)
+        : memory(gpu, vp::extract_workspace_bytes(from, grid_of(from.extent), o, limits)), view{memory.data(),
+                                                                                                memory.size(), limits} {
+        EXPECT_NE(memory.size(), 0u);
+        EXPECT_EQ(cudaMemsetAsync(memory.data(), 0xa5, memory.size(), gpu.stream), cudaSuccess);
+    }
+};
+
+template <class T>
+std::vector<T> read(vp::cuda_backend& gpu, const T* from, std::uint64_t count) {
+    return from == nullptr ? std::vector<T>{} : gpu.read(vp::backend_view<const T>{from, count});
+}
+
+host_surface to_host(vp::cuda_backend& gpu, const vp::surface_result& r, const vp::status& s) {
+    const auto counts = read(gpu, r.counts, 1)[0];
+    EXPECT_EQ(counts, s.surface);
+    return {s,
+            r.samples,
+            read(gpu, r.vertices, counts.vertices),
+            read(gpu, r.triangles, counts.faces),
+            read(gpu, r.quads, counts.faces),
+            {}};
+}
+
+// extract and extract_async with the room that the first one needs, and a little less.
+template <class View>
+void expect_same(vp::cuda_backend& gpu, const View& from, const vp::extract_options& o) {
+    const vp::grid g = grid_of(from.extent);
+    vp::surface<vp::cuda_backend> s(gpu);
+    const vp::status status = vp::extract(gpu, from, g, s, o);
+    const host_surface expected = surface_tests::to_host(gpu, s, status);
+    vp::surface_limits limits;
+    for (int attempt = 0; attempt < 3; ++attempt) { // cells, then the others
+        const workspace tried(gpu, from, o, limits);
+        vp::surface_result out;
+        ASSERT_TRUE(vp::extract_async(gpu, from, g, out, o, tried.view).ok());
+        const vp::status found = vp::read_surface_status(gpu, tried.view, &limits);
+        if (found.ok()) {
+            EXPECT_TRUE(to_host(gpu, out, found).has_same_arrays(expected));
+            EXPECT_NE(attempt, 0);
+            // A vertex less does not fit, and leaves nothing.
+            vp::surface_limits less = limits;
+            --less.vertices;
+            const workspace small(gpu, from, o, less);
+            ASSERT_TRUE(vp::extract_async(gpu, from, g, out, o, small.view).ok());
+            vp::surface_limits need;
+            const vp::status failed = vp::read_surface_status(gpu, small.view, &need);
+            if (failed.ok()) { // the room was of the cells
+                EXPECT_TRUE(to_host(gpu, out, failed).has_same_arrays(expected));
+            } else {
+                EXPECT_EQ(failed.code, vp::status_code::capacity_exceeded);
+                EXPECT_EQ(need.vertices, limits.vertices);
+                EXPECT_EQ(read(gpu, out.counts, 1)[0], vp::surface_counters{});
+            }
+            return;
+        }
+        EXPECT_EQ(found.code, vp::status_code::capacity_exceeded);
+    }
+    FAIL() << "the room that was asked for does not suffice";
+}
+
+} // namespace
+
+TEST(DeviceSurfacesAsync, OfBitsHaveTheBytesOfExtract) {
+    vp::cuda_backend gpu;
+    std::mt19937 random(1);
+    for (int k = 0; k < 4; ++k) {
+        const bit_volume v = random_volume(random, glm::ivec3(3 + 15 * k, 4 + k, 7), 0.3 + 0.1 * k);
+        const std::vector<std::uint32_t> words = v.words();
+        vp::cuda_backend::buffer<std::uint32_t> memory(gpu, vp::array_view<const std::uint32_t>(words));
+        const vp::target_view<bits> view{memory.data(), v.extent};
+        expect_same(gpu, view, {});
+        expect_same(gpu, view, {.place = vp::place::corner, .quads = true});
+        expect_same(gpu, view, {.border = vp::border::open, .min_component = 12});
+        expect_same(gpu, view, {.quads = true, .min_component = 20});
+    }
+}
+
+TEST(DeviceSurfacesAsync, OfFieldsHaveTheBytesOfExtract) {
+    vp::cuda_backend gpu;
+    std::mt19937 random(2);
+    const glm::ivec3 extent(37, 9, 8);
+    std::vector<float> values(37 * 9 * 8);
+    for (float& f : values) f = static_cast<float>(random() % 2001) / 1000.0f - 1.0f;
+    values[77] = std::nanf("");
+    vp::cuda_backend::buffer<float> memory(gpu, vp::array_view<const float>(values));
+    const vp::target_view<field> view{memory.data(), extent};
+    expect_same(gpu, view, {});
+    expect_same(gpu, view, {.level = 0.3, .border = vp::border::open});
+}
+
+TEST(DeviceSurfacesAsync, GraphsFollowTheSamples) {
+    vp::cuda_backend gpu;
+    cudaStream_t stream = nullptr;
+    ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
+    gpu.stream = stream;
+    {
+        const glm::ivec3 extent(20, 11, 9);
+        std::mt19937 random(3);
+        std::vector<float> values(20 * 11 * 9);
+        vp::cuda_backend::buffer<float> memory(gpu, values.size());
+        const vp::target_view<field> view{memory.data(), extent};
+        const workspace room(gpu, view, {}, {3000, 4000, 6000});
+        vp::surface_result out;
+        ASSERT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
+        cudaGraph_t graph = nullptr;
+        cudaGraphExec_t launchable = nullptr;
+        ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
+        ASSERT_TRUE(vp::extract_async(gpu, view, grid_of(extent), out, {}, room.view).ok());
+        ASSERT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
+        ASSERT_EQ(cudaGraphInstantiate(&launchable, graph, 0), cudaSuccess);
+        for (int frame = 0; frame < 3; ++frame) {
+            const double inside = frame == 1 ? 0.0 : 0.1 * frame + 0.3;
+            for (float& f : values) f = static_cast<double>(random() % 1000) < 1000 * inside ? -0.5f : 0.25f;
+            ASSERT_EQ(cudaMemcpy(memory.data(), values.data(), values.size() * sizeof(float), cudaMemcpyHostToDevice),
+                      cudaSuccess);
+            ASSERT_EQ(cudaGraphLaunch(launchable, stream), cudaSuccess);
+            const vp::status s = vp::read_surface_status(gpu, room.view);
+            ASSERT_TRUE(s.ok()) << s.message();
+            EXPECT_EQ(s.surface.vertices == 0, frame == 1);
+            EXPECT_TRUE(to_host(gpu, out, s).has_same_arrays(extract_field(gpu, values, grid_of(extent))));
+        }
+        EXPECT_EQ(cudaGraphExecDestroy(launchable), cudaSuccess);
+        EXPECT_EQ(cudaGraphDestroy(graph), cudaSuccess);
+    }
+    EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
+}
+
+TEST(DeviceSurfacesAsync, RefusesWhatItCannotDo) {
+    vp::cuda_backend gpu;
+    vp::cuda_backend::buffer<std::uint32_t> memory(gpu, 64);
+    const vp::target_view<bits> view{memory.data(), glm::ivec3(8)};
+    const vp::surface_limits limits{100, 100, 100};
+    const workspace room(gpu, view, {}, limits);
+    vp::surface_result out;
+    const auto code = [&](const vp::extract_options& o, vp::surface_workspace_view w) {
+        return vp::extract_async(gpu, view, grid_of(glm::ivec3(8)), out, o, w).code;
+    };
+    EXPECT_EQ(code({.embedded = true}, room.view), vp::status_code::strategy_unavailable);
+    EXPECT_EQ(code({.level = 1.0}, room.view), vp::status_code::bad_surface_options);
+    vp::surface_workspace_view bad = room.view;
+    --bad.bytes;
+    EXPECT_EQ(code({}, bad), vp::status_code::capacity_exceeded);
+    bad = room.view;
+    bad.limits.quads = std::uint64_t{1} << 33;
+    EXPECT_EQ(code({}, bad), vp::status_code::size_overflow);
+    EXPECT_EQ(vp::extract_workspace_bytes(view, grid_of(glm::ivec3(8)), {}, bad.limits), 0u);
+    EXPECT_EQ(vp::extract_async(gpu, view, grid_of(glm::ivec3(9)), out, {}, room.view).code,
+              vp::status_code::extent_mismatch);
+}
