@@ -27,6 +27,7 @@ struct pipeline_state {
     unsigned int index_error;          // bad_index, bad_numbers, stopped
     // Tile split; solids: the last two count long rows; distances: short lists, long ones, parts of the longest ones.
     unsigned int num_items, num_splits, num_images;
+    unsigned int has_wide_splits;   // tile split: 1 if a tile has many images
     unsigned int next_item;         // fine raster; solids: entries that have a place
     unsigned int num_ordered[5];    // fragment order: lengths of order_lists
     unsigned long long longest_run; // of those, the longest run of one voxel that is too long for a block

@@ -6,6 +6,7 @@
 // dropped (paper section 4, coarse raster). A tile is a voxel of a coarser grid, so the same exact coverage
 // decides.
 
+#include <voxelpipe/core/corner_signs.hpp>
 #include <voxelpipe/device/scene/count_and_emit.cuh>
 #include <voxelpipe/device/scene/int128_coverage.cuh>
 #include <voxelpipe/device/scene/triangle_source.cuh>
@@ -50,6 +51,34 @@ struct tile_cells {
         }
         return others == 0 && longest < small_columns ? n : 0;
     }
+    // The tiles of a triangle whose bounding box is at most three tiles a side and lies inside the grid, by the signs
+    // of floats (core/corner_signs.hpp): bits x + 3 y + 9 z from the box's lowest tile on, which is `lo`; 0 if this or
+    // the signs are not so. Not for thin coverage and arms. Most triangles that are no lines are such.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE word find_cube(const geometry& geo, const int32_triangle& t,
+                                                             std::int32_t (&lo)[3]) const {
+        const int fraction = geo.snap.fraction + tiles.log2_size;
+        if (!t.fits_int32 || t.inside(geo.extent) < 0 || fraction > max_sign_fraction) return 0;
+        core::small_box box;
+        for (int k = 0; k < 3; ++k) {
+            lo[k] = t.lo[k] >> tiles.log2_size;
+            box.lo[k] = 0;
+            box.hi[k] = (t.hi[k] >> tiles.log2_size) - lo[k];
+            if (box.hi[k] > 2) return 0;
+        }
+        const core::ruled_out out = core::rule_out_by_signs(t.q, lo, box.hi, fraction);
+        if (!out.sure) return 0;
+        word cube = 0;
+        core::rows_of_three(out, box, [&](int y, int z, word row) { cube |= row << (3 * y + 9 * z); });
+        return cube;
+    }
+    __device__ VOXELPIPE_INLINE void emit_cube(std::uint32_t primitive, const std::int32_t (&lo)[3], word cube,
+                                               unsigned long long at) const {
+        for (; cube != 0; cube &= cube - 1, ++at) {
+            const int i = exact::lowest_one(cube);
+            keys[at] = static_cast<std::uint32_t>(tiles.index(lo[0] + i % 3, lo[1] + i / 3 % 3, lo[2] + i / 9));
+            primitives[at] = primitive;
+        }
+    }
     __device__ VOXELPIPE_INLINE void emit_line(std::uint32_t primitive, const glm::ivec3& lo, const glm::ivec3& hi,
                                                unsigned long long at) const {
         for (int z = lo.z; z <= hi.z; ++z)
@@ -70,6 +99,7 @@ struct tile_cells {
 
 private:
     static constexpr unsigned long long nothing = ~0ull;
+    static constexpr int max_sign_fraction = 20; // of rule_out_by_signs, in units of tiles
 
     // Visits the triangle's tiles within the box and returns their number. Stores them from `at` on, unless `at` is
     // `nothing`. Out of line and shared by all kernels of the coarse raster: it is most of their code.
@@ -111,7 +141,8 @@ private:
 // Takes room for the `value` pairs of each thread from *num; returns where the thread's begin, or no_room for the whole
 // block. All threads of the block call it, once.
 inline constexpr unsigned long long no_room = ~0ull;
-[[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long take_room(std::uint32_t value, unsigned long long* num,
+template <class Number>
+[[nodiscard]] __device__ VOXELPIPE_INLINE unsigned long long take_room(std::uint32_t value, Number* num,
                                                                        unsigned long long capacity) {
     __shared__ std::uint32_t warp_sums[threads_per_block / 32];
     __shared__ unsigned long long first;
@@ -125,7 +156,7 @@ inline constexpr unsigned long long no_room = ~0ull;
         all += warp_sums[w];
     }
     if (threadIdx.x == 0) {
-        const unsigned long long at = all == 0 ? 0 : atomicAdd(num, static_cast<unsigned long long>(all));
+        const unsigned long long at = all == 0 ? 0 : atomicAdd(num, static_cast<Number>(all));
         first = at + all > capacity ? no_room : at;
     }
     __syncthreads();
@@ -135,10 +166,23 @@ inline constexpr unsigned long long no_room = ~0ull;
 // The triangles of a block that are no lines of tiles. They cost far more, so the threads share them out.
 struct left_triangles {
     static constexpr unsigned each = tuning::coarse_triangles, max = each * threads_per_block;
-    std::uint32_t ids[max], counts[max]; // of tiles
+    std::uint32_t ids[max];
+    std::uint32_t tiles[max]; // their number; or, with the highest bit, tile_cells::find_cube
+    static constexpr std::uint32_t is_cube = 1u << 31;
     unsigned num;
     unsigned kinds[5]; // by triangle_class
 };
+
+// See tile_cells::find_cube.
+template <coverage Rule>
+[[nodiscard]] __device__ VOXELPIPE_INLINE word find_cube(const geometry& geo, const tile_cells<Rule>& op,
+                                                         std::uint32_t id, std::int32_t (&lo)[3]) {
+    if (Rule != coverage::conservative || geo.arms != core::arm_set::none) return 0;
+    const draw_geometry& d = geo.draw(geo.find_draw(id));
+    const glm::uvec3 index = d.triangles[id - d.first_primitive];
+    if (index.x >= d.num_vertices || index.y >= d.num_vertices || index.z >= d.num_vertices) return 0;
+    return op.find_cube(geo, load_int32(raster_input<stored_source>{{d}, 0, geo.snap.fraction, geo.extent}, index), lo);
+}
 
 // Appends the pairs of small triangles, several of a thread's at a time, and records the large ones. All threads of the
 // block call it.
@@ -170,6 +214,13 @@ __device__ VOXELPIPE_INLINE void append_small(const geometry& geo, const tile_ce
     __syncthreads();
     for (unsigned at = threadIdx.x; at < left.num; at += threads_per_block) {
         const std::uint32_t id = left.ids[at];
+        std::int32_t lowest[3];
+        if (const word cube = find_cube(geo, op, id, lowest); cube != 0) {
+            atomicAdd(&left.kinds[static_cast<int>(triangle_class::drawn)], 1u);
+            left.tiles[at] = cube | left_triangles::is_cube;
+            pairs += static_cast<std::uint32_t>(__popc(cube));
+            continue;
+        }
         const loaded_triangle t = geo.load(id);
         std::uint32_t n = 0;
         if (!t.index_ok) {
@@ -189,7 +240,7 @@ __device__ VOXELPIPE_INLINE void append_small(const geometry& geo, const tile_ce
                     record_chunks(geo, t, id, box, b);
             }
         }
-        left.counts[at] = n;
+        left.tiles[at] = n;
         pairs += n;
     }
     unsigned long long at = take_room(pairs, b.num_cells, limits.tile_pairs); // its barriers complete left.kinds
@@ -211,12 +262,20 @@ __device__ VOXELPIPE_INLINE void append_small(const geometry& geo, const tile_ce
         at += tiles_of[k];
     }
     for (unsigned i = threadIdx.x; i < left.num; i += threads_per_block) {
-        if (left.counts[i] == 0) continue;
+        if (left.tiles[i] == 0) continue;
+        if ((left.tiles[i] & left_triangles::is_cube) != 0) {
+            const word cube = left.tiles[i] & ~left_triangles::is_cube;
+            std::int32_t lowest[3];
+            (void)find_cube(geo, op, left.ids[i], lowest);
+            op.emit_cube(left.ids[i], lowest, cube, at);
+            at += static_cast<unsigned>(__popc(cube));
+            continue;
+        }
         const loaded_triangle t = geo.load(left.ids[i]);
         core::voxel_box reach{};
         (void)core::classify<Rule>(t.a, t.b, t.c, geo.snap.fraction, geo.whole_box(), reach);
         op.emit(geo, t, left.ids[i], op.cells(reach), true, at);
-        at += left.counts[i];
+        at += left.tiles[i];
     }
 }
 

@@ -17,27 +17,31 @@ __global__ void tile_split_kernel(const std::uint32_t* keys, Buffers out, pipeli
     if (has_failed(*state, limits)) return;
     const auto num_pairs = static_cast<std::uint32_t>(state->tile_pairs);
     const std::uint64_t i = std::uint64_t{blockIdx.x} * blockDim.x + threadIdx.x;
-    if (i >= num_pairs) return;
-    const std::uint32_t tile = keys[i];
-    if (i != 0 && keys[i - 1] == tile) return;
-    // Finds the end of the run: doubling steps from its start, then bisection.
+    const std::uint32_t tile = i < num_pairs ? keys[i] : 0;
     const auto first = static_cast<std::uint32_t>(i);
-    std::uint64_t lo = first, step = 1;
-    while (lo + step < num_pairs && keys[lo + step] == tile) {
-        lo += step;
-        step *= 2;
+    std::uint32_t count = 0; // of the run that begins here
+    if (i < num_pairs && (i == 0 || keys[i - 1] != tile)) {
+        // Finds the end of the run: doubling steps from its start, then bisection.
+        std::uint64_t lo = first, step = 1;
+        while (lo + step < num_pairs && keys[lo + step] == tile) {
+            lo += step;
+            step *= 2;
+        }
+        const std::uint64_t end = lo + step < num_pairs ? lo + step : num_pairs;
+        const std::uint64_t last = core::bisect_last(lo, end, [=](std::uint64_t at) { return keys[at] == tile; });
+        count = static_cast<std::uint32_t>(last + 1 - first);
     }
-    const std::uint64_t end = lo + step < num_pairs ? lo + step : num_pairs;
-    const std::uint64_t last = core::bisect_last(lo, end, [=](std::uint64_t at) { return keys[at] == tile; });
-    const auto count = static_cast<std::uint32_t>(last + 1 - first);
     const std::uint32_t parts = (count + out.pairs_per_item - 1) / out.pairs_per_item;
-    const std::uint32_t at = atomicAdd(&state->num_items, parts);
+    // A block takes room once: an atomic for each run would be most of the time.
+    const auto at = static_cast<std::uint32_t>(take_room(parts, &state->num_items, ~0u));
+    if (parts == 0) return;
     if (parts == 1) {
         out.items[at] = {tile, first, count, no_image};
         return;
     }
     const std::uint32_t image = atomicAdd(&state->num_images, parts);
     out.splits[atomicAdd(&state->num_splits, 1u)] = {tile, image, parts};
+    if (parts > max_narrow_split) state->has_wide_splits = 1;
     const std::uint32_t each = (count + parts - 1) / parts;
     for (std::uint32_t p = 0; p < parts; ++p) {
         const std::uint32_t begin = p * each < count ? p * each : count;

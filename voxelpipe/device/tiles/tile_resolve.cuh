@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Tile resolve: merges the images of every split tile, before any rounding, and stores the tile. A block takes 32
-// voxels of a tile; its warps share the images, so a tile of a thousand images costs a thread only a few reads.
+// Tile resolve: merges the images of every split tile, before any rounding, and stores the tile. A warp takes 32 voxels
+// of a tile with few images, and waits for no other. Of a tile with more a block takes 32 voxels; its warps share the
+// images, so a tile of a thousand images costs a thread only a few reads.
 
 #include <voxelpipe/device/base/stage_clock.cuh>
 #include <voxelpipe/device/tiles/fine_raster.cuh>
@@ -95,6 +96,55 @@ struct winner_merge {
     __device__ static void merge(cell& a, cell b) { a = b > a ? b : a; }
 };
 
+// A group of 32 voxels of a split tile of at most 32 images, by one warp, which waits for nobody. Returns the number of
+// voxels that were touched, in every lane.
+template <class Image, class Scene, class Framebuffer>
+__device__ unsigned resolve_narrow(const Scene& s, const Framebuffer& fb, const fine_raster_input& in,
+                                   const split_tile& split, int group) {
+    const unsigned lane = threadIdx.x % 32;
+    const core::voxel_box box = core::tile_box(in.tiles, split.tile, s.geo.extent);
+    const image_column<Image> column{in.images + std::size_t{split.first_image} * Image::words, split.num_images,
+                                     group};
+    unsigned touched = 0;
+    if (in.track) {
+        const word mine = lane < split.num_images ? column.image(lane)[Image::touched_at + group] : 0;
+        const word all = __reduce_or_sync(0xffffffffu, mine);
+        if (all == 0) return 0;
+        touched = static_cast<unsigned>(__popc(all));
+    }
+    if constexpr (Image::has_bits) {
+        Image::for_each_target([&]<std::size_t K>() {
+            using t = typename Image::template target<K>;
+            if constexpr (method_of<t>() == blend_method::bits) {
+                using blend_type = bit_blend<typename t::blend_type>;
+                word mine = blend_type::neutral;
+                if (lane < split.num_images) mine = column.image(lane)[Image::template offset<K>() + group];
+                for (unsigned step = 16; step > 0; step /= 2)
+                    blend_type::merge(mine, __shfl_xor_sync(0xffffffffu, mine, step));
+                if (static_cast<int>(lane) < rows_per_word<Image>)
+                    store_bit_row<Image, K>(fb, box, group * rows_per_word<Image> + static_cast<int>(lane), mine);
+            }
+        });
+    }
+    const voxel_position at = voxel_in_tile<Image>(box, 32 * group + static_cast<int>(lane));
+    if constexpr (Image::has_atomic) {
+        Image::for_each_target([&]<std::size_t K>() {
+            using t = typename Image::template target<K>;
+            if constexpr (method_of<t>() == blend_method::atomic) {
+                using blend_type = value_blend<typename t::blend_type, typename t::value_type>;
+                typename blend_type::cell merged{};
+                if (column.template cell<blend_type>(Image::template offset<K>(), 0, 1, merged))
+                    store_cell(voxelpipe::get<K>(fb.targets), at, merged);
+            }
+        });
+    }
+    if constexpr (Image::has_winner) {
+        word winner = 0;
+        if (column.template cell<winner_merge>(Image::winner_at, 0, 1, winner)) store_winners<Image>(s, fb, at, winner);
+    }
+    return touched;
+}
+
 template <class Image, class Scene, class Framebuffer>
 __global__ __launch_bounds__(threads_per_block) void tile_resolve_kernel(const __grid_constant__ Scene s,
                                                                          const __grid_constant__ Framebuffer fb,
@@ -106,9 +156,18 @@ __global__ __launch_bounds__(threads_per_block) void tile_resolve_kernel(const _
     __shared__ __align__(16) unsigned char memory[tuning::resolve_bytes];
     const unsigned lane = threadIdx.x % 32;
     const std::uint64_t work = std::uint64_t{state->num_splits} * groups;
-    std::uint64_t touched = 0; // in thread 0
-    for (std::uint64_t job = blockIdx.x; job < work; job += gridDim.x) {
+    std::uint64_t touched = 0; // in the first thread of a warp
+    for (std::uint64_t job = std::uint64_t{blockIdx.x} * resolve_warps + warp_in_block(); job < work;
+         job += std::uint64_t{gridDim.x} * resolve_warps) {
         const split_tile split = splits[job / groups];
+        if (split.num_images > max_narrow_split) continue;
+        const unsigned n = resolve_narrow<Image>(s, fb, in, split, static_cast<int>(job % groups));
+        if (lane == 0) touched += n;
+    }
+    const std::uint64_t wide_work = state->has_wide_splits != 0 ? work : 0;
+    for (std::uint64_t job = blockIdx.x; job < wide_work; job += gridDim.x) {
+        const split_tile split = splits[job / groups];
+        if (split.num_images <= max_narrow_split) continue;
         const auto group = static_cast<int>(job % groups);
         const core::voxel_box box = core::tile_box(in.tiles, split.tile, s.geo.extent);
         const image_column<Image> column{in.images + std::size_t{split.first_image} * Image::words, split.num_images,
