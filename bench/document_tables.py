@@ -194,7 +194,10 @@ def paper(title, columns):
         name, _, here = paper_figures.SCENES[r["scene"]]
         what = f"{name}, {re.split('[,:]', here)[0]}" if r["resolution"] == 128 else ""
         body.append([what, f"{r['resolution']}³"] + [f"{r[c]:.1f}" if c.startswith("paper") else short(r[c]) for _, c in columns])
-    return f"{title}, milliseconds. H200, ours: " + head_line("h200") + "\n\n" + table(["scene, its mesh on the H200", "N"] + [t for t, _ in columns], body)
+    heads = head_line("h200")
+    if any(c.startswith("tiled") for _, c in columns):
+        heads += "\nBy tiles: " + head_line("h200", "computed.csv")
+    return f"{title}, milliseconds. H200, ours: " + heads + "\n\n" + table(["scene, its mesh on the H200", "N"] + [t for t, _ in columns], body)
 
 
 def paper_scenes():

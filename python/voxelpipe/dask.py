@@ -228,8 +228,8 @@ def _cluster() -> Any:
 def map_models(
     paths: Sequence[Any], function: Callable[..., Any], *, retries: int = 0, **options: Any
 ) -> list[Outcome]:
-    """Calls function(model, **options) for every file, on the cluster of Dask's client where there is one, and else on
-    threads of this process.
+    """Calls ``function(model, **options)`` for every file, on the cluster of Dask's client where there is one, and
+    else on threads of this process.
 
     A model that cannot be read, a function that raises, and on a cluster a worker that dies, are outcomes with an error;
     the others go on.

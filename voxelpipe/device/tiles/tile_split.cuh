@@ -20,7 +20,7 @@ struct split_tile {
     std::uint32_t tile, first_image, num_images;
 };
 
-// A split tile of at most so many images is resolved by warps that do not wait for each other.
+// Most images of a split tile that warps resolve without waiting for each other.
 inline constexpr std::uint32_t max_narrow_split = 32;
 
 struct split_buffers {
