@@ -48,6 +48,7 @@ std::set<std::string> all_options() {
             "--iso D",
             "--remesh",
             "--place WHERE",
+            "--embedded",
             "--quads",
             "--report",
             "--fill,--fill-color WHAT",
