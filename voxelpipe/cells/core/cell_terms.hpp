@@ -38,7 +38,7 @@ template <bool WithMoments, class Int>
     if (y0 >= size && y1 >= size) return {0, 0, 0};
     if (y0 <= 0 && y1 <= 0) return height();
     const bool is_whole = y0 >= 0 && y0 <= size && y1 >= 0 && y1 <= size && begin == z0 && end == z1;
-    const std::int64_t of_whole = (2 * size - y0 - y1) * (end - begin) * half_square;
+    const std::int64_t of_whole = is_whole ? (2 * size - y0 - y1) * (end - begin) * half_square : 0;
     if (!WithMoments && is_whole) return sign(of_whole, 0, 0);
 
     // y at a z, times the edge's height: exact.
