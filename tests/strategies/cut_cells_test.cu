@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Cut cells on the device: the bytes and counters of cpu_backend, for triangles of all sizes, by all axes, of parts of
-// a grid, for bodies and blends.
+// Cut cells and links on the device: the bytes and counters of cpu_backend, for triangles of all sizes, by all axes, of
+// parts of a grid, for bodies and blends.
 #include "device_test.hpp"
 #include "solid_drawings.hpp"
 
@@ -120,6 +120,45 @@ TEST(DeviceCells, MeasuresHaveTheBytesOfTheCpu) {
         expect_same<measured_target>(meshes, axis == 1 ? flat.crop({5, 3, 2}, {19, 14, 20}) : flat,
                                      everything_measured{},
                                      {.bodies = axis == 2 ? vp::bodies::draw : vp::bodies::call, .axis = axis});
+}
+
+// The lists of both backends, record by record. Returns the number of crossed links.
+static std::uint64_t expect_same_links(const std::vector<mesh_data>& meshes, const vp::grid& g, int neighbours) {
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    vp::link_list<vp::cpu_backend> a(cpu);
+    vp::link_list<vp::cuda_backend> b(gpu);
+    const auto run = [&](auto& backend, auto& list) {
+        using backend_type = std::remove_reference_t<decltype(backend)>;
+        std::vector<vp::mesh<backend_type>> on_backend;
+        for (const mesh_data& m : meshes) on_backend.emplace_back(backend, m.positions, m.triangles);
+        std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, vp::none>> draws;
+        for (const auto& m : on_backend) draws.push_back({m.view(), {}, {}});
+        return vp::voxelize_links(backend, draws, g, list, {.neighbours = neighbours});
+    };
+    const vp::status expected = run(cpu, a), found = run(gpu, b);
+    EXPECT_TRUE(expected.ok()) << expected.message();
+    EXPECT_TRUE(found.ok()) << found.message();
+    EXPECT_EQ(expected.counts, found.counts);
+    EXPECT_EQ(a.neighbours, b.neighbours);
+    device_test::expect_same_bytes(a.voxels.to_host(cpu), b.voxels.to_host(gpu), "voxels");
+    device_test::expect_same_bytes(a.q.to_host(cpu), b.q.to_host(gpu), "q");
+    device_test::expect_same_bytes(a.primitives.to_host(cpu), b.primitives.to_host(gpu), "primitives");
+    device_test::expect_same_bytes(a.draws.to_host(cpu), b.draws.to_host(gpu), "draws");
+    return expected.counts.fragments;
+}
+
+TEST(DeviceLinks, HaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{25, 21, 24};
+    mesh_data m = device_test::mixed_triangles(120, 22, 5);
+    device_test::append(m, device_test::long_triangles(extent, 8, 3));
+    const std::vector<mesh_data> meshes{m, device_test::tied_bodies(20, 8, 2), device_test::ball({12, 9, 11}, 6.3f, 7)};
+    vp::grid flat = device_test::box_grid(extent);
+    flat.voxel_size = {0.5f, 1.25f, 0.75f};
+    EXPECT_GT(expect_same_links(meshes, device_test::box_grid(extent), 26), 5000u);
+    EXPECT_GT(expect_same_links(meshes, flat, 18), 1000u);
+    EXPECT_GT(expect_same_links(meshes, flat.crop({5, 3, 2}, {17, 14, 19}), 26), 1000u);
+    EXPECT_EQ(expect_same_links({}, flat, 18), 0u);
 }
 
 TEST(DeviceCells, NothingAndBadIndices) {
