@@ -122,6 +122,21 @@ TEST(DeviceCells, MeasuresHaveTheBytesOfTheCpu) {
                                      {.bodies = axis == 2 ? vp::bodies::draw : vp::bodies::call, .axis = axis});
 }
 
+// Cones over the holes of each body, or of all together, in parts of a grid too.
+TEST(DeviceCells, ClosedHolesHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{22, 21, 23};
+    mesh_data open = device_test::ball({11, 10, 11}, 7.3f, 7), other = device_test::ball({12, 9, 11}, 5.2f, 6);
+    open.triangles.erase(open.triangles.begin() + 3, open.triangles.begin() + 9);
+    other.triangles.erase(other.triangles.end() - 7);
+    const vp::grid g = device_test::box_grid(extent);
+    for (int axis = 0; axis < 3; ++axis)
+        for (const vp::bodies b : {vp::bodies::call, vp::bodies::draw})
+            expect_same<every_target>({open, other}, axis == 1 ? g.crop({4, 3, 5}, {9, 15, 12}) : g, everything{2},
+                                      {.bodies = b, .axis = axis, .repair = vp::repair::close_holes});
+    expect_same<measured_target>({open, other}, g, everything_measured{},
+                                 {.repair = vp::repair::close_holes, .max_hole_edges = 5});
+}
+
 // The lists of both backends, record by record. Returns the number of crossed links.
 static std::uint64_t expect_same_links(const std::vector<mesh_data>& meshes, const vp::grid& g, int neighbours) {
     vp::cpu_backend cpu;

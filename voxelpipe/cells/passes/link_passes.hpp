@@ -7,7 +7,6 @@
 
 #include <voxelpipe/cells/links.hpp>
 #include <voxelpipe/cells/passes/cell_passes.hpp>
-#include <voxelpipe/surfaces/passes/mesh_rows.hpp>
 
 #include <bit>
 #include <cstdint>
@@ -160,7 +159,7 @@ struct write_links {
             const std::uint64_t element = to + static_cast<std::uint64_t>(link);
             q[element] = to_link_fraction(best.position);
             primitives[element] = best.primitive;
-            draws[element] = find_owner(mesh.first_triangle, mesh.num_draws, best.triangle);
+            draws[element] = mesh.draw_of(best.triangle);
         }
     }
 
