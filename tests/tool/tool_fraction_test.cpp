@@ -233,9 +233,9 @@ TEST(Fraction, HolesAreClosed) {
     add(file, open);
     const std::vector<float> expected = library_fractions({whole}, grid_of_16());
     const auto values = [&](const std::vector<std::string>& arguments, outcome& result) {
-        result = draw(folder, file, "o.npz", arguments);
+        result = draw(folder, file, "o.npy", arguments);
         EXPECT_EQ(0, result.code) << result.err;
-        return read_npz(folder / "o.npz", "fraction");
+        return read_npy(folder / (arguments[1] == "fraction" ? "o.npy" : "o.fraction.npy"));
     };
     outcome result;
     const array closed = values({"-t", "fraction", "--close-holes", "--stats", "json"}, result);
