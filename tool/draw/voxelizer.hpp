@@ -54,7 +54,7 @@ struct voxelize_request {
     std::vector<target> targets{target::occupancy}; // channels of the volume, in this order, none twice
     int depth_axis = 2;                             // 0 x, 1 y, 2 z
     bool clamp = false;                             // fractions to 0..1
-    std::uint64_t close_holes = 0; // before cut cells are measured: holes of at most so many edges; 0: none
+    std::uint64_t close_holes = 0; // before cells are measured, holes of up to this number of edges; 0: no holes
     blend_alpha alpha = blend_alpha::weight;
     backend_choice backend = backend_choice::automatic;
     voxelpipe::strategy strategy = voxelpipe::strategy::automatic; // on a GPU

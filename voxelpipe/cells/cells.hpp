@@ -27,9 +27,8 @@ struct cell_options {
     int axis = 0;
     bool count_voxels = true;     // fill counters::voxels
     bool count_open_edges = true; // fill cell_counters::open_edges, which sorts all edges
-    // Of meshes that are not closed: none, or close_holes, which puts a cone over each hole of each body, as for
-    // solids. Cones are triangles of the mesh then: they cut voxels and have areas. Host memory for all triangles and
-    // vertices.
+    // repair::none, or repair::close_holes, which first puts a cone over each hole of each body, as for solids. Cones
+    // are triangles of the mesh then: they cut voxels and have areas. Takes host memory for all triangles and vertices.
     voxelpipe::repair repair = voxelpipe::repair::none;
     std::uint64_t max_hole_edges = std::numeric_limits<std::uint64_t>::max(); // holes with more edges stay open
 };
