@@ -7,6 +7,7 @@
 #include "solid_drawings.hpp"
 
 #include <voxelpipe/cells/device/cells.cuh>
+#include <voxelpipe/slabs/stream.hpp>
 
 #include <cpu_ref/cells/voxelize_cells.hpp>
 
@@ -135,6 +136,42 @@ TEST(DeviceCells, ClosedHolesHaveTheBytesOfTheCpu) {
                                       {.bodies = b, .axis = axis, .repair = vp::repair::close_holes});
     expect_same<measured_target>({open, other}, g, everything_measured{},
                                  {.repair = vp::repair::close_holes, .max_hole_edges = 5});
+}
+
+// Slabs of a stream on the device, with holes that the host closes: the cpu's whole.
+TEST(DeviceCells, SlabsOfAStreamAreTheWhole) {
+    namespace slabs = vp::slabs;
+    const glm::ivec3 extent{14, 17, 15};
+    mesh_data open = device_test::ball({7, 8, 7}, 5.3f, 7);
+    open.triangles.erase(open.triangles.end() - 7, open.triangles.end() - 3);
+    const vp::grid g = device_test::box_grid(extent);
+    const vp::cell_options how{.count_open_edges = false, .repair = vp::repair::close_holes};
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    one_target<vp::cpu_backend> whole(cpu, extent);
+    const vp::status expected = draw(cpu, {open}, g, vp::fraction{}, whole, how);
+    ASSERT_TRUE(expected.ok()) << expected.message();
+    slabs::stream stream(gpu, g, vp::passthrough{}, {.num_slabs = 4, .repair = vp::repair::close_holes});
+    ASSERT_TRUE(stream.add({open.positions, open.triangles}).ok());
+    std::vector<float> found;
+    std::size_t num_slabs = 0;
+    const vp::status s = stream.draw_cells(
+        vp::fraction{},
+        [&](glm::ivec3 e) {
+            return one_target<vp::cuda_backend>{gpu, e};
+        },
+        [&](const slabs::slab&, const one_target<vp::cuda_backend>& part) { // layers along z follow each other
+            const auto values = vp::get<0>(part).to_host(gpu);
+            found.insert(found.end(), values.begin(), values.end());
+            ++num_slabs;
+        },
+        how);
+    ASSERT_TRUE(s.ok()) << s.message();
+    EXPECT_EQ(num_slabs, 4u);
+    EXPECT_EQ(s.counts, expected.counts);
+    EXPECT_TRUE(s.cells == expected.cells);
+    EXPECT_GT(s.cells.cones, 0u);
+    device_test::expect_same_bytes(vp::get<0>(whole).to_host(cpu), found, "slabs");
 }
 
 // The lists of both backends, record by record. Returns the number of crossed links.

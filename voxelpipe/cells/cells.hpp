@@ -31,6 +31,9 @@ struct cell_options {
     // are triangles of the mesh then: they cut voxels and have areas. Takes host memory for all triangles and vertices.
     voxelpipe::repair repair = voxelpipe::repair::none;
     std::uint64_t max_hole_edges = std::numeric_limits<std::uint64_t>::max(); // holes with more edges stay open
+    // close_holes of a part of a mesh: the cones of each body of the whole one, in host memory, in units of the whole
+    // grid, as solid_options::cones. Null: they are found.
+    const core::hole_cones* cones = nullptr;
 };
 
 // One voxel of one body: what a cell's shader gets. Units are u = 2^-44 of the voxel, or of its face.

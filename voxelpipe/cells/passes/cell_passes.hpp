@@ -29,6 +29,11 @@ namespace voxelpipe::core {
     return axis == 0 ? p : axis == 1 ? glm::ivec3(p.y, p.z, p.x) : glm::ivec3(p.z, p.x, p.y);
 }
 
+// Turns a position that can be drawn.
+[[nodiscard]] VOXELPIPE_HD inline snapped_position turn(const snapped_position& p, int axis) {
+    return axis == 0 ? p : axis == 1 ? snapped_position{p.y, p.z, p.x} : snapped_position{p.z, p.x, p.y};
+}
+
 // The areas of a voxel's faces, along the rows and the two other axes.
 [[nodiscard]] inline cell_areas areas_of(const grid& g, int axis) {
     const double side = std::ldexp(1.0, std::ilogb(std::max({g.voxel_size.x, g.voxel_size.y, g.voxel_size.z})));
@@ -53,8 +58,7 @@ public:
         : backend_(backend), counts_(backend, array_view<const std::uint64_t>(zeros.data(), zeros.size())),
           positions_(backend, num_vertices(draws)), triangles_(backend, num_triangles(draws)),
           first_triangle_(backend, 0), fraction_(g.fraction()), extent_(turn(g.extent, axis)),
-          areas_(areas_of(g, axis)) {
-        const snap_transform snap = make_snap_transform(g);
+          areas_(areas_of(g, axis)), snap_(make_snap_transform(g)), axis_(axis) {
         std::uint64_t first_vertex = 0, first_triangle = 0;
         for (std::size_t d = 0; d < draws.size(); ++d) {
             begins_.push_back({first_vertex, first_triangle});
@@ -64,7 +68,7 @@ public:
             const std::uint64_t vertices = mesh.positions.size() * mesh.copies.count;
             const std::uint64_t triangles = mesh.triangles.size() * mesh.copies.count;
             backend.for_each(vertices, passes::snap_vertices_of_cells<mesh_type, shader_type>{
-                                           mesh, draws[d].vertex_shader, static_cast<std::uint32_t>(d), snap, axis,
+                                           mesh, draws[d].vertex_shader, static_cast<std::uint32_t>(d), snap_, axis,
                                            positions_.data() + first_vertex});
             backend.for_each(triangles, passes::join_triangles{elements_of<mesh_type>::indices(mesh),
                                                                static_cast<std::uint32_t>(first_vertex),
@@ -98,6 +102,37 @@ public:
 
     // Adds the cones that close the holes of each body, found on the host. Throws as core::close_holes.
     void close_holes(bodies each, std::uint64_t max_hole_edges, cell_counters& counts) {
+        add_cones(find_cones(each, max_hole_edges), counts);
+    }
+    // The same with cones that are known, of this many bodies, in units of the whole grid.
+    void close_holes(const hole_cones* known, std::size_t num_bodies, cell_counters& counts) {
+        std::vector<hole_cones> cones;
+        for (std::size_t b = 0; b < num_bodies; ++b) {
+            cones.push_back(moved(known[b], snap_.offset));
+            for (snapped_position& p : cones.back().positions) p = turn(p, axis_);
+        }
+        add_cones(std::move(cones), counts);
+    }
+
+    void count_open_edges() {
+        const std::uint64_t edges = std::uint64_t{3} * triangles_.size();
+        buffer<std::uint64_t> keys(backend_, edges);
+        buffer<std::uint32_t> order(backend_, edges);
+        backend_.for_each(edges, passes::hash_edges{mesh(), keys.data(), order.data()});
+        backend_.sort_by_key(keys, order, passes::edge_key_bits);
+        backend_.for_each(edges, passes::count_open_edges{mesh(), keys.data(), order.data(), edges, counts_.data()});
+    }
+
+    // The number of vertices through all draws and instances.
+    template <class Draw>
+    [[nodiscard]] static std::uint64_t num_vertices(std::span<const Draw> draws) {
+        std::uint64_t n = 0;
+        for (const auto& d : draws) n += d.mesh.positions.size() * d.mesh.copies.count;
+        return n;
+    }
+
+private:
+    [[nodiscard]] std::vector<hole_cones> find_cones(bodies each, std::uint64_t max_hole_edges) {
         const std::vector<snapped_position> positions = positions_.to_host(backend_);
         std::vector<glm::uvec3> triangles = triangles_.to_host(backend_);
         std::vector<hole_part> parts;
@@ -118,6 +153,9 @@ public:
         } else {
             cones.push_back(core::close_holes(parts, max_hole_edges));
         }
+        return cones;
+    }
+    void add_cones(std::vector<hole_cones>&& cones, cell_counters& counts) {
         std::uint64_t vertices = positions_.size(), count = triangles_.size();
         for (const hole_cones& c : cones) {
             counts.hole_edges += c.edges;
@@ -153,24 +191,6 @@ public:
         set_parts();
     }
 
-    void count_open_edges() {
-        const std::uint64_t edges = std::uint64_t{3} * triangles_.size();
-        buffer<std::uint64_t> keys(backend_, edges);
-        buffer<std::uint32_t> order(backend_, edges);
-        backend_.for_each(edges, passes::hash_edges{mesh(), keys.data(), order.data()});
-        backend_.sort_by_key(keys, order, passes::edge_key_bits);
-        backend_.for_each(edges, passes::count_open_edges{mesh(), keys.data(), order.data(), edges, counts_.data()});
-    }
-
-    // The number of vertices through all draws and instances.
-    template <class Draw>
-    [[nodiscard]] static std::uint64_t num_vertices(std::span<const Draw> draws) {
-        std::uint64_t n = 0;
-        for (const auto& d : draws) n += d.mesh.positions.size() * d.mesh.copies.count;
-        return n;
-    }
-
-private:
     template <class Draw>
     [[nodiscard]] static std::uint64_t num_triangles(std::span<const Draw> draws) {
         std::uint64_t n = 0;
@@ -197,6 +217,8 @@ private:
     int fraction_;
     glm::ivec3 extent_;
     cell_areas areas_;
+    snap_transform snap_;
+    int axis_;
 };
 
 // The status of a call that has succeeded, or what failed.
@@ -247,7 +269,12 @@ template <class Backend, class Mesh, class VertexShader, class CellShader, class
     if (cell_scene<Backend>::num_vertices(draws) >= most) return fail(status_code::out_of_memory);
     cell_scene<Backend> scene(backend, draws, g, options.axis);
     cell_counters holes;
-    if (options.repair == repair::close_holes) scene.close_holes(options.bodies, options.max_hole_edges, holes);
+    if (options.repair == repair::close_holes) {
+        if (options.cones != nullptr)
+            scene.close_holes(options.cones, options.bodies == bodies::call ? 1 : draws.size(), holes);
+        else
+            scene.close_holes(options.bodies, options.max_hole_edges, holes);
+    }
     const std::uint64_t triangles = scene.num_triangles();
     const bool finds_edges = options.count_open_edges;
     if (finds_edges && 3 * triangles >= most) return fail(status_code::out_of_memory);
