@@ -50,17 +50,18 @@ scene_bytes bytes_of(const scene& model, const voxelize_request& request) {
 }
 
 // Bytes of drawing cut cells beside the result, after the other targets: snapped vertices and triangles; and the edges
-// that are sorted, or the pairs of a triangle and a voxel that meet, of a surface somewhat larger than that of the
-// grid. Other values alone are drawn beside fractions that nobody keeps.
+// that are sorted, or those of holes, or the pairs of a triangle and a voxel that meet, of a surface somewhat larger
+// than that of the grid. Other values alone are drawn beside fractions that nobody keeps.
 double fraction_bytes(const voxelize_request& request, double vertices, double triangles) {
     if (!request.wants_cells()) return 0;
     const glm::dvec3 n(request.grid.extent);
     constexpr double triangle_bytes = 36, edges_bytes = 72;
     const double pair_bytes = request.wants(target::area) || request.wants(target::centroid) ? 128 : 56;
     const double pairs = 2 * triangles + 2.5 * (n.x * n.y + n.y * n.z + n.z * n.x);
+    const double holes = request.close_holes != 0 ? 40 * vertices + 36 * triangles : 0; // on the host
     const double scratch = request.wants(target::fraction) ? 0 : sizeof(float) * n.x * n.y * n.z;
     return scratch + sizeof(vp::core::snapped_position) * vertices + triangle_bytes * triangles +
-           std::max(edges_bytes * triangles, pair_bytes * pairs);
+           std::max({edges_bytes * triangles, pair_bytes * pairs, holes});
 }
 double fraction_bytes(const scene& model, const voxelize_request& request) {
     return fraction_bytes(request, static_cast<double>(model.vertex_count()),
