@@ -149,8 +149,8 @@ double surface_voxels(const voxelize_request& request) {
     return 2 * (n.x * n.y + n.y * n.z + n.z * n.x);
 }
 
-// The same of a model, where that is less. A plane touches |x| + |y| + |z| voxels for each of its area, (x, y, z) being
-// its normal; triangles that lie apart touch one each at least.
+// The voxels of a model, where they are fewer. A plane touches |x| + |y| + |z| voxels for each of its area, (x, y, z)
+// being its normal; triangles that lie apart touch one each at least.
 double surface_voxels(const scene& model, const voxelize_request& request) {
     const double of_grid = surface_voxels(request);
     if (!request.write_bytes) return of_grid;
