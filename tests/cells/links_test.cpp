@@ -407,6 +407,25 @@ TEST(Links, BadInputWritesNothing) {
     EXPECT_EQ(list.neighbours, 18);
 }
 
+// Lists alone: memory does not follow the grid, until its links have no numbers of 63 bits any more.
+TEST(Links, GridsMayBeFarLargerThanMemory) {
+    const glm::ivec3 extent(1 << 20, 1 << 18, 1 << 18);
+    const glm::vec3 at(1048000.0F, 200000.0F, 262000.0F);
+    const mesh m = solids::box(at, at + glm::vec3(2.25F, 3.5F, 1.75F));
+    const vp::grid g = solids::unit_grid(extent);
+    const glm::ivec3 begin = glm::ivec3(at) - 2, size(8);
+    const host_links all = library_links(m, g), part = library_links(m, g.crop(begin, size));
+    EXPECT_GT(all.voxels.size(), 50u);
+    ASSERT_EQ(all.voxels.size(), part.voxels.size());
+    for (std::size_t i = 0; i < all.voxels.size(); ++i) EXPECT_EQ(all.voxels[i], part.voxels[i] + begin);
+    EXPECT_EQ(all.q, part.q);
+    vp::cpu_backend backend(1);
+    vp::link_list<vp::cpu_backend> list(backend);
+    EXPECT_EQ(
+        vp::voxelize_links(backend, m.view(), solids::unit_grid(glm::ivec3(1 << 20)), vp::passthrough{}, list).code,
+        vp::status_code::size_overflow);
+}
+
 // The 26 directions are all there are; opposite ones are next to each other.
 TEST(Links, DirectionsAreAllNeighbours) {
     std::map<std::tuple<int, int, int>, int> seen;
