@@ -101,3 +101,23 @@ python3 packaging/page/make_page.py "$folder/tool/tool/voxelize.wasm" "$folder/v
 [[ $check -eq 1 ]] || exit 0
 
 need_packages "${build_packages[@]}" libgtest-dev chromium nodejs
+say "building the tool of this machine, and the golden cases"
+configure test
+cmake --build build/test --target voxelize golden_hashes -j "$jobs" >"$folder/native.log" 2>&1 || { tail -n 50 "$folder/native.log"; die "the tool of this machine"; }
+cp -r "$folder/staged/include/gtest" "$prefix/include/"
+mkdir -p "$prefix/src"
+cp -r "$folder/staged/src/googletest" "$prefix/src/"
+cp -r "$folder/staged/share/cmake/GTest" "$prefix/share/cmake/"
+build tool . golden_hashes -DVOXELPIPE_BUILD_TESTS=ON
+
+say "driving the page in Chromium"
+scripts/python_env.sh >/dev/null
+mkdir -p "$folder/models"
+build/test/tests/golden/golden_hashes --write-model "$folder/models"
+large=()
+for file in ../shared/gltf/DamagedHelmet.glb; do [[ ! -e $file ]] || large+=("$file"); done
+.venv/bin/python packaging/page/test_page.py "$(command -v chromium || command -v chromium-browser || command -v google-chrome)" \
+    "$folder/voxelize.html" build/test/tool/voxelize "$folder/models" "$folder/test" "${large[@]}"
+
+say "comparing golden hashes"
+scripts/golden.sh --build "$folder/tool" node packaging/page/run.mjs >"$folder/hashes.txt"

@@ -15,6 +15,8 @@ import subprocess
 import sys
 import time
 
+import numpy as np
+
 sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "tests/tool/formats"))
 from browser import Browser  # noqa: E402
 
@@ -145,6 +147,26 @@ def check_refusals(page, tool, models, folder, report):
     assert page.convert() == "done", page.message()
 
 
+def check_large_text(page, tool, folder, report):
+    """An OBJ of more than 50 MB: hills of 1.9 million triangles."""
+    side = 970
+    across, along = (a.ravel() for a in np.meshgrid(np.arange(side), np.arange(side)))
+    first = (along * side + across + 1).reshape(side, side)[:-1, :-1].ravel()
+    model = folder / "hills.obj"
+    with model.open("w") as file:
+        heights = 40 * np.sin(across / 71.0) * np.cos(along / 53.0)
+        file.write("".join(f"v {x}.25 {h:.6f} {z}.75\n" for x, h, z in zip(across.tolist(), heights.tolist(), along.tolist())))
+        file.write("".join(f"f {n} {n + 1} {n + side}\nf {n + 1} {n + side + 1} {n + side}\n" for n in first.tolist()))
+    size = model.stat().st_size
+    assert size > 50_000_000, size
+    page.set(resolution=256, fill="", values="occupancy")
+    assert page.choose(model) == "done", page.message()
+    report(f"an OBJ of {size} bytes at 256: {float(page.browser.evaluate('document.body.dataset.seconds')):.1f} s")
+    _, expected = native(tool, (model,), "hills.npz", ["-r", "256", "-t", "occupancy"], folder)
+    assert page.save("hills.npz") == expected
+    model.unlink()
+
+
 def check_cancel(page, models):
     """The button ends the work at once, and the next model is converted."""
     page.set(resolution=700, fill="nonzero")
@@ -204,11 +226,12 @@ def main():
         check_refusals(page, tool, models, folder, report)
         page.picture("refused.png")
         check_cancel(page, models)
+        check_large_text(page, tool, folder, report)
         check_sizes(page, models)
         for large in map(pathlib.Path, sys.argv[6:]):
             page.set(resolution=256, fill="", values="occupancy,color")
             assert page.choose(large) == "done", page.message()
-            report(f"{large.name} at 256 in colour: {page.browser.evaluate('document.body.dataset.seconds')} s")
+            report(f"{large.name} at 256 in colour: {float(page.browser.evaluate('document.body.dataset.seconds')):.1f} s")
             page.wait_for_voxels()
             page.picture("large.png")
         asked = [e["params"]["request"]["url"] for e in browser.events if e["method"] == "Network.requestWillBeSent"]

@@ -85,12 +85,14 @@ void measure_overhead() noexcept {
     if (limit_bytes != UINT64_MAX) allowed = difference(limit_bytes, rest + reserve);
 }
 
+#if !defined(__wasi__)
 // The number in FILE; the greatest number if FILE holds none ("max").
 std::uint64_t number_in(const std::string& file) {
     std::ifstream stream(file);
     std::uint64_t number = 0;
     return stream >> number ? number : UINT64_MAX;
 }
+#endif
 
 std::string limit_text() {
     return mebibytes(static_cast<double>(limit_bytes)) +
