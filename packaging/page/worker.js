@@ -8,15 +8,12 @@
 onmessage = async ({ data: { id, module, args, files } }) => {
   const begin = performance.now(), of_out = new TextDecoder(), of_err = new TextDecoder();
   let out = '', err = '', last = '';
-  // The tool's bar, of which the newest state counts: it is written over the line, which then is emptied.
+  // The tool's bar is written over its line, in pieces. What is written over goes; the newest bar is told.
   const say = bytes => {
-    err += of_err.decode(bytes, { stream: true });
-    const at = err.lastIndexOf('\x1b[K');
-    if (at < 0) return;
-    const line = err.slice(at + 3), bar = /^(.*?) \[[#.]*\] +(\d+) %$/.exec(line);
-    err = err.slice(0, err.lastIndexOf('\r', at)) + (bar ? '\r\x1b[K' + line : line);
-    if (bar && line !== last) postMessage({ id, progress: `${bar[1]}: ${bar[2]} %`, percent: +bar[2] });
-    last = line;
+    err = (err + of_err.decode(bytes, { stream: true })).replace(/\r\x1b\[K[^\r\n]*(?=\r\x1b\[K)/g, '');
+    const bar = /\r\x1b\[K(.*?) \[[#.]*\] +(\d+) %$/.exec(err);
+    if (bar && bar[0] !== last) postMessage({ id, progress: `${bar[1]}: ${bar[2]} %`, percent: +bar[2] });
+    if (bar) last = bar[0];
   };
   const wasi = new Wasi({ args, print: bytes => { out += of_out.decode(bytes, { stream: true }); }, say, terminal: true });
   let code = null;
@@ -28,6 +25,7 @@ onmessage = async ({ data: { id, module, args, files } }) => {
     const full = error instanceof RangeError && !/stack/.test(error.message);
     err += `voxelize: ${full ? 'the browser gives no more memory' : 'the program broke down on this model'} (${error.message})\n`;
   }
+  err = err.replace(/\r\x1b\[K(.*?\[[#.]*\] +\d+ %)?/g, '');
   const outputs = code === 0 ? wasi.files('/out').map(([path, bytes]) => [path, bytes.slice()]) : [];
   const memory = wasi.memory ? wasi.memory.buffer.byteLength : 0;
   postMessage({ id, code, out, err, outputs, seconds: (performance.now() - begin) / 1000, memory }, outputs.map(([, bytes]) => bytes.buffer));
