@@ -97,7 +97,10 @@ fi
 say "building the tool"
 build tool . voxelize -DCMAKE_PREFIX_PATH="$prefix" -DVOXELPIPE_ENABLE_CUDA=OFF -DVOXELPIPE_ENABLE_MPI=OFF -DVOXELPIPE_BUILD_TOOL=ON \
     -DVOXELPIPE_INSTALL=OFF -DVOXELPIPE_JOIN_FILES=ON -DVOXELPIPE_TOOL_OPTIONS=-O2 -DVOXELPIPE_PARSER_OPTIONS=-Os
-python3 packaging/page/make_page.py "$folder/tool/tool/voxelize.wasm" "$folder/voxelize.html"
+# The licences of all that the page holds.
+python3 packaging/page/make_page.py "$folder/tool/tool/voxelize.wasm" "$folder/voxelize.html" LICENSE "$folder"/src/*/debian/copyright \
+    /usr/share/doc/{libglm-dev,libtinygltf-dev,nlohmann-json3-dev,libstb-dev,libcli11-dev}/copyright "$lib/libcxx/LICENSE.TXT" \
+    "$lib"/libc/wasi/LICENSE* "$lib/libc/musl/COPYRIGHT" "$zig/LICENSE"
 [[ $check -eq 1 ]] || exit 0
 
 need_packages "${build_packages[@]}" libgtest-dev chromium nodejs
@@ -120,4 +123,4 @@ for file in ../shared/gltf/DamagedHelmet.glb; do [[ ! -e $file ]] || large+=("$f
     "$folder/voxelize.html" build/test/tool/voxelize "$folder/models" "$folder/test" "${large[@]}"
 
 say "comparing golden hashes"
-scripts/golden.sh --build "$folder/tool" node packaging/page/run.mjs >"$folder/hashes.txt"
+scripts/golden.sh --build "$folder/tool" node "$root/packaging/page/run.mjs" >"$folder/hashes.txt"

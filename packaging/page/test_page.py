@@ -150,7 +150,8 @@ def check_refusals(page, tool, models, folder, report):
     page.set(resolution=2000, fill="nonzero", values="occupancy,color")
     assert page.choose(models / "model.glb") == "failed"
     assert "MiB are needed" in page.message(), page.message()
-    report(f"2000 voxels along a side: {page.message()}")
+    page.picture("refused.png")
+    report("2000 voxels along a side: " + page.message().replace("\n", "; "))
     page.set(resolution=16, fill="")
     assert page.convert() == "done", page.message()
 
@@ -232,9 +233,11 @@ def main():
         page = Page(browser, page_file, folder)
         report(f"ready after {time.monotonic() - begin:.1f} s")
         page.picture("empty.png")
+        browser.evaluate("document.getElementById('licences').open = true")
+        browser.wait_for("['libwebp', 'musl', 'draco', 'LLVM'].every(name => document.getElementById('licence').textContent.includes(name))")
+        browser.evaluate("document.getElementById('licences').open = false")
         check_files(page, tool, models, folder, report)
         check_refusals(page, tool, models, folder, report)
-        page.picture("refused.png")
         check_cancel(page, models)
         check_large_text(page, tool, folder, report)
         check_sizes(page, models)
