@@ -407,7 +407,8 @@ TEST(Links, BadInputWritesNothing) {
     EXPECT_EQ(list.neighbours, 18);
 }
 
-// Lists alone: memory does not follow the grid, until its links have no numbers of 63 bits any more.
+// Links are kept as a list, so memory follows the crossings and not the grid. A link has a number of 63 bits: a grid
+// with more links than that is refused.
 TEST(Links, GridsMayBeFarLargerThanMemory) {
     const glm::ivec3 extent(1 << 20, 1 << 18, 1 << 18);
     const glm::vec3 at(1048000.0F, 200000.0F, 262000.0F);
