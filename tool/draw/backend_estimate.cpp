@@ -19,7 +19,7 @@ constexpr double cuda_start_ms = 250, cuda_calls_ms = 5, cuda_bytes_per_ns = 6, 
 
 } // namespace
 
-work_size work_of(const voxelize_request& request, double triangles, double model_bytes) {
+work_size work_of(const voxelize_request& request, double triangles, double model_bytes, bool in_bricks) {
     work_size work;
     work.triangles = triangles;
     const glm::dvec3 n(request.grid.extent);
@@ -28,6 +28,7 @@ work_size work_of(const voxelize_request& request, double triangles, double mode
                               [](target id) { return id != target::occupancy && id != target::count; });
     work.model_bytes = model_bytes;
     work.result_bytes = volume_bytes(request);
+    if (in_bricks) work.result_bytes *= std::min(1.0, work.fragments / (n.x * n.y * n.z));
     return work;
 }
 

@@ -6,6 +6,7 @@
 
 #include "pipeline_solid.hpp"
 #include "pipeline_surface.hpp"
+#include "sparse/sparse_parts.hpp"
 
 #include <voxelpipe/device/surface_calls.cuh>
 
@@ -14,6 +15,7 @@
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace voxelize {
 
@@ -55,9 +57,16 @@ struct memory_access<vp::cuda_backend> {
         }
         gpu::check(cudaStreamSynchronize(backend.stream));
     }
+    template <class T>
+    [[nodiscard]] static std::vector<T> list(vp::cuda_backend& backend, const T* from, std::size_t count) {
+        std::vector<T> copied(count);
+        gpu::check(cudaMemcpyAsync(copied.data(), from, count * sizeof(T), cudaMemcpyDeviceToHost, backend.stream));
+        gpu::check(cudaStreamSynchronize(backend.stream));
+        return copied;
+    }
 };
 
-// Instantiated in cuda_bits.cu, cuda_surface.cu, cuda_outer.cu and cuda_solid.cu.
+// Each is instantiated in a file of its own, which CMake writes.
 #define VOXELIZE_CUDA_BITS(HOW)                                                                                        \
     HOW template void pipeline<vp::cuda_backend>::draw_bits(volume&, const voxelpipe::grid&, int);
 #define VOXELIZE_CUDA_SURFACE(HOW)                                                                                     \
@@ -67,5 +76,23 @@ struct memory_access<vp::cuda_backend> {
 #define VOXELIZE_CUDA_SOLID(HOW)                                                                                       \
     HOW template void pipeline<vp::cuda_backend>::draw_solid(volume&, const voxelpipe::grid&, int);                    \
     HOW template void pipeline<vp::cuda_backend>::examine_solid_bits(const voxelpipe::grid&);
+#define VOXELIZE_CUDA_BRICK_BITS(HOW)                                                                                  \
+    HOW template bool sparse_pipeline<vp::cuda_backend>::draw_walls(sparse_volume&, const voxelpipe::grid&,            \
+                                                                    const vp::sparse_limits&);                         \
+    HOW template bool sparse_pipeline<vp::cuda_backend>::draw_bits(sparse_volume&, const voxelpipe::grid&,             \
+                                                                   const vp::sparse_limits&);                          \
+    HOW template std::optional<brick_counts> sparse_pipeline<vp::cuda_backend>::count_touched(const voxelpipe::grid&,  \
+                                                                                              voxelpipe::coverage);
+#define VOXELIZE_CUDA_BRICK_SURFACE(HOW)                                                                               \
+    HOW template bool sparse_pipeline<vp::cuda_backend>::draw_occupied(sparse_volume&, const voxelpipe::grid&,         \
+                                                                       const vp::sparse_limits&);                      \
+    HOW template bool sparse_pipeline<vp::cuda_backend>::draw_surface(sparse_volume&, const voxelpipe::grid&,          \
+                                                                      const vp::sparse_limits&);
+#define VOXELIZE_CUDA_BRICK_OUTER(HOW)                                                                                 \
+    HOW template bool sparse_pipeline<vp::cuda_backend>::draw_outer_in(const voxelpipe::grid&,                         \
+                                                                       const vp::sparse_limits&, sparse_volume&);
+#define VOXELIZE_CUDA_BRICK_SOLID(HOW)                                                                                 \
+    HOW template vp::status sparse_pipeline<vp::cuda_backend>::draw_solid_bits(const voxelpipe::grid&, sparse_volume&, \
+                                                                               channel&);
 
 } // namespace voxelize

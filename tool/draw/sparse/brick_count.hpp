@@ -5,19 +5,17 @@
 // Looks at an uploaded scene before it is drawn into bricks: what its surface comes to.
 
 #include "brick_need.hpp"
+#include "draw/surface.hpp"
+#include "model/scene.hpp"
 
 #include <voxelpipe/voxelpipe.hpp>
 
-#include <bitset>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <span>
-#include <utility>
 
 namespace voxelize {
 
-// The surface in the request's part of the grid, which the scene was uploaded for.
+// The surface in the request's part of the grid, which the scene was uploaded for, into memory that the host reads.
 template <class Uploaded>
 [[nodiscard]] surface_layers surface_of(const Uploaded& scene) {
     const voxelpipe::grid part = scene.relative_grid();
@@ -39,23 +37,20 @@ template <class Uploaded>
     return surface;
 }
 
-// What the triangles touch of a grid, counted without keeping it; none if that did not work. Framebuffer: a sparse one
-// whose first target is a bit.
-template <class Framebuffer, class Backend, class Uploaded>
-[[nodiscard]] std::optional<brick_counts> count_touched(Backend& backend, const Uploaded& scene,
-                                                        const voxelpipe::grid& g, voxelpipe::coverage rule) {
-    std::bitset<2> enabled;
-    enabled[0] = true;
-    Framebuffer framebuffer(backend, g.extent, enabled);
-    framebuffer.limit({0, 0});
-    const auto times = std::exchange(backend.times, nullptr);
-    const auto& draws = scene.bits_draws();
-    const voxelpipe::status status =
-        voxelpipe::voxelize(backend, std::span(draws), g, framebuffer, voxelpipe::voxelize_options{rule});
-    backend.times = times;
-    if (status.ok()) return brick_counts{};
-    if (status.code != voxelpipe::status_code::capacity_exceeded) return std::nullopt;
-    return brick_counts{static_cast<double>(status.required.bricks), static_cast<double>(status.required.voxels)};
+// The surface of a scene in PART, a grid that is relative to `reference`; its lines too, with `with_lines`.
+[[nodiscard]] inline surface_layers surface_of(const scene& model, const voxelpipe::grid& part,
+                                               const glm::dvec3& reference, bool with_lines) {
+    surface_layers surface(part);
+    const glm::dvec3 corner = part.origin / part.voxel_size + glm::dvec3(part.offset);
+    for (const instance& shown : model.instances) {
+        const primitive& of = model.primitives[shown.primitive];
+        const placed_vertex_shader place(shown.to_world, reference);
+        const auto at = [&](std::uint32_t i) { return glm::dvec3(place(of.positions[i])) / part.voxel_size - corner; };
+        for (const glm::uvec3& t : of.triangles) surface.add_triangle(at(t.x), at(t.y), at(t.z));
+        if (!with_lines) continue;
+        for (const glm::uvec2& l : of.lines) surface.add_line(at(l.x), at(l.y));
+    }
+    return surface;
 }
 
 } // namespace voxelize
