@@ -8,6 +8,8 @@
 #include "sparse/brick_drawer.hpp"
 #include "voxelizer.hpp"
 
+#include <voxelpipe/stage_times.hpp>
+
 #include <chrono>
 #include <cstdint>
 #include <functional>

@@ -4,6 +4,7 @@
 // The tool's pipeline for cuda_backend: how it reads targets, and which file compiles which of its parts. nvcc takes
 // minutes for all kernels of the pipeline, so each part that draws is instantiated in a file of its own.
 
+#include "model/parallel.hpp"
 #include "pipeline_solid.hpp"
 #include "pipeline_surface.hpp"
 #include "sparse/sparse_parts.hpp"
@@ -12,6 +13,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstring>
+#include <memory>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -35,27 +38,92 @@ __global__ void work_out(T* out, std::size_t first, std::size_t count, const Val
     if (i < count) out[i] = value(first + i);
 }
 
+// Host memory that the device writes directly, for two pieces on their way from it.
+class staging {
+public:
+    static constexpr std::size_t size = std::size_t{32} << 20; // bytes of a piece
+
+    // Made when it is first used, and freed when the thread ends.
+    static staging& of_this_thread() {
+        static thread_local staging made;
+        return made;
+    }
+    staging(const staging&) = delete;
+    staging& operator=(const staging&) = delete;
+
+    // Begins to copy piece 0 or 1 from the device.
+    void copy(std::size_t piece, const void* from, std::size_t bytes, cudaStream_t stream) {
+        if (!memory_[piece]) {
+            void* memory = nullptr;
+            check(cudaMallocHost(&memory, size));
+            memory_[piece].reset(static_cast<std::byte*>(memory));
+            check(cudaEventCreateWithFlags(&is_there_[piece], cudaEventDisableTiming));
+        }
+        check(cudaMemcpyAsync(memory_[piece].get(), from, bytes, cudaMemcpyDeviceToHost, stream));
+        check(cudaEventRecord(is_there_[piece], stream));
+    }
+    // Waits for a piece, and puts it where it belongs.
+    void take(std::size_t piece, void* to, std::size_t bytes, int threads) {
+        check(cudaEventSynchronize(is_there_[piece]));
+        constexpr std::size_t block = std::size_t{1} << 20;
+        parallel_for((bytes + block - 1) / block, threads, [&](std::size_t b) {
+            std::memcpy(static_cast<std::byte*>(to) + b * block, memory_[piece].get() + b * block,
+                        std::min(block, bytes - b * block));
+        });
+    }
+
+private:
+    struct unpin {
+        void operator()(std::byte* memory) const { (void)cudaFreeHost(memory); }
+    };
+    staging() = default;
+    ~staging() {
+        for (const cudaEvent_t event : is_there_)
+            if (event != nullptr) (void)cudaEventDestroy(event);
+    }
+
+    std::unique_ptr<std::byte, unpin> memory_[2];
+    cudaEvent_t is_there_[2] = {};
+};
+
 } // namespace gpu
 
-// Values are worked out on the device, piece by piece, and each piece is copied to where it belongs.
+// Values are worked out on the device, piece by piece. Each piece is copied into memory that the device can write
+// directly, and from there, by all threads, to where it belongs, while the device works on the next one.
 template <>
 struct memory_access<vp::cuda_backend> {
     static constexpr bool on_host = false;
 
     template <class T, class Value>
-    static void read(vp::cuda_backend& backend, T* out, std::size_t count, const Value& value, int) {
-        constexpr std::size_t piece = (std::size_t{32} << 20) / sizeof(T);
-        vp::cuda_backend::buffer<T> buffer{backend, std::min(count, piece)};
-        for (std::size_t first = 0; first < count; first += piece) {
-            const std::size_t size = std::min(piece, count - first);
-            constexpr unsigned threads = 256;
-            gpu::work_out<<<static_cast<unsigned>((size + threads - 1) / threads), threads, 0, backend.stream>>>(
-                buffer.data(), first, size, value);
+    static void read(vp::cuda_backend& backend, T* out, std::size_t count, const Value& value, int threads) {
+        constexpr std::size_t piece = gpu::staging::size / sizeof(T);
+        const std::size_t pieces = (count + piece - 1) / piece;
+        constexpr std::size_t little = std::size_t{4}
+                                       << 20; // bytes that are there before memory could be made for them
+        const bool is_little = count * sizeof(T) <= little;
+        std::vector<vp::cuda_backend::buffer<T>> values;
+        for (std::size_t i = 0; i < std::min<std::size_t>(pieces, 2); ++i)
+            values.push_back({backend, std::min(count, piece)});
+        gpu::staging& waiting = gpu::staging::of_this_thread();
+        const auto size_of_piece = [&](std::size_t i) { return std::min(piece, count - i * piece); };
+        const auto start = [&](std::size_t i) {
+            constexpr unsigned block = 256;
+            const std::size_t size = size_of_piece(i);
+            T* const made = values[i % 2].data();
+            gpu::work_out<<<static_cast<unsigned>((size + block - 1) / block), block, 0, backend.stream>>>(
+                made, i * piece, size, value);
             gpu::check(cudaGetLastError());
-            gpu::check(
-                cudaMemcpyAsync(out + first, buffer.data(), size * sizeof(T), cudaMemcpyDeviceToHost, backend.stream));
+            if (is_little)
+                gpu::check(cudaMemcpyAsync(out, made, size * sizeof(T), cudaMemcpyDeviceToHost, backend.stream));
+            else
+                waiting.copy(i % 2, made, size * sizeof(T), backend.stream);
+        };
+        if (pieces != 0) start(0);
+        if (is_little) return gpu::check(cudaStreamSynchronize(backend.stream));
+        for (std::size_t i = 0; i < pieces; ++i) {
+            if (i + 1 < pieces) start(i + 1);
+            waiting.take(i % 2, out + i * piece, size_of_piece(i) * sizeof(T), threads);
         }
-        gpu::check(cudaStreamSynchronize(backend.stream));
     }
     template <class T>
     [[nodiscard]] static std::vector<T> list(vp::cuda_backend& backend, const T* from, std::size_t count) {

@@ -238,7 +238,7 @@ private:
     // A channel whose values come later.
     void add_unset(sparse_volume& result, target id) {
         channel& c = add_channel(result, id);
-        c.data.resize(static_cast<std::size_t>(result.num_values()) * sizeof(glm::u8vec4));
+        fill_channel(c, result.num_values(), 0);
     }
     static void add_occupancy(sparse_volume& result) { result.channels.push_back({"occupancy", scalar::bit, 1, {}}); }
 
