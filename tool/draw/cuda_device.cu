@@ -24,6 +24,8 @@ VOXELIZE_CUDA_BRICK_BITS(extern)
 VOXELIZE_CUDA_BRICK_SURFACE(extern)
 VOXELIZE_CUDA_BRICK_OUTER(extern)
 VOXELIZE_CUDA_BRICK_SOLID(extern)
+VOXELIZE_CUDA_DISTANCE(extern)
+VOXELIZE_CUDA_REMESH(extern)
 
 namespace {
 
@@ -110,23 +112,54 @@ limited_memory memory_of(const voxelize_request& request) {
     return limited_memory{request.device_memory != 0 ? request.device_memory : UINT64_MAX};
 }
 
+// The first GPU, which works for one request.
+class one_gpu {
+public:
+    one_gpu(const cuda_facts& facts, const voxelize_request& request, voxelize_stats& stats)
+        : facts_(facts), request_{request}, stats_{stats}, memory_(memory_of(request)), gpus_({0}) {
+        backend().resource = memory_;
+        backend().strategy = request.strategy;
+        stats.backend = "cuda";
+        stats.device = facts.name;
+        stats.devices = 1;
+        stats.threads = thread_count(request.threads);
+    }
+    [[nodiscard]] vp::cuda_backend& backend() { return gpus_.backend(0); }
+
+    // work() with the GPU as the thread's. Throws device_memory_error.
+    template <class Work>
+    void run(const Work& work) {
+        try {
+            gpus_.for_each(1, [&](std::size_t, vp::cuda_backend&) { work(); });
+        } catch (const std::bad_alloc&) {
+            if (memory_.refused() == 0) throw;
+            throw too_little_memory(facts_, request_, memory_.refused());
+        }
+        stats_.device_memory = std::max(stats_.device_memory, memory_.most());
+        stats_.strategy = backend().last_strategy();
+    }
+
+private:
+    cuda_facts facts_;
+    const voxelize_request& request_;
+    voxelize_stats& stats_;
+    limited_memory memory_;
+    slabs::devices gpus_;
+};
+
 // Bricks on the first GPU.
 class cuda_bricks : public brick_drawer {
 public:
     cuda_bricks(const cuda_facts& facts, scene& model, const voxelize_request& request, voxelize_stats& stats,
                 vp::stage_times& times)
-        : facts_(facts), request_{request}, stats_{stats}, memory_(memory_of(request)), gpus_({0}) {
-        vp::cuda_backend& backend = gpus_.backend(0);
-        backend.resource = memory_;
-        backend.times = &times;
-        backend.strategy = request.strategy;
-        stats.backend = "cuda";
-        stats.device = facts.name;
-        stats.devices = 1;
-        draw([&] { pipeline_ = std::make_unique<sparse_pipeline<vp::cuda_backend>>(backend, model, request, stats); });
+        : gpu_(facts, request, stats) {
+        gpu_.backend().times = &times;
+        gpu_.run([&] {
+            pipeline_ = std::make_unique<sparse_pipeline<vp::cuda_backend>>(gpu_.backend(), model, request, stats);
+        });
     }
     ~cuda_bricks() override {
-        gpus_.for_each(1, [&](std::size_t, vp::cuda_backend&) { pipeline_.reset(); });
+        gpu_.run([&] { pipeline_.reset(); });
     }
 
     sparse_volume run(const voxelpipe::grid& whole) override {
@@ -144,28 +177,13 @@ public:
 
 private:
     template <class Work>
-    void draw(const Work& work) {
-        try {
-            gpus_.for_each(1, [&](std::size_t, vp::cuda_backend&) { work(); });
-        } catch (const std::bad_alloc&) {
-            if (memory_.refused() == 0) throw;
-            throw too_little_memory(facts_, request_, memory_.refused());
-        }
-    }
-    template <class Work>
     sparse_volume drawn(const Work& work) {
         sparse_volume bricks;
-        draw([&] { bricks = work(); });
-        stats_.device_memory = std::max(stats_.device_memory, memory_.most());
-        stats_.strategy = gpus_.backend(0).last_strategy();
+        gpu_.run([&] { bricks = work(); });
         return bricks;
     }
 
-    cuda_facts facts_;
-    const voxelize_request& request_;
-    voxelize_stats& stats_;
-    limited_memory memory_;
-    slabs::devices gpus_;
+    one_gpu gpu_;
     std::unique_ptr<sparse_pipeline<vp::cuda_backend>> pipeline_;
 };
 
@@ -174,6 +192,22 @@ private:
 std::unique_ptr<brick_drawer> bricks_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
                                              voxelize_stats& stats, vp::stage_times& times) {
     return std::make_unique<cuda_bricks>(facts, model, request, stats, times);
+}
+
+volume distances_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
+                         voxelize_stats& stats) {
+    one_gpu gpu(facts, request, stats);
+    volume result;
+    gpu.run([&] { result = draw_distances(gpu.backend(), model, request, stats); });
+    return result;
+}
+
+surface_mesh remeshed_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
+                              voxelize_stats& stats) {
+    one_gpu gpu(facts, request, stats);
+    surface_mesh result;
+    gpu.run([&] { result = remesh_scene(gpu.backend(), model, request, stats); });
+    return result;
 }
 
 volume run_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request, voxelize_stats& stats) {

@@ -5,6 +5,7 @@
 // pipeline on it. Defined in cuda_device.cu and cuda_look.cu where the program is built with CUDA, in no_cuda.cpp where
 // it is not.
 
+#include "model/surface_mesh.hpp"
 #include "sparse/brick_drawer.hpp"
 #include "voxelizer.hpp"
 
@@ -97,6 +98,12 @@ struct device_memory_error : memory_error {
 [[nodiscard]] std::unique_ptr<brick_drawer> bricks_on_cuda(const cuda_facts& facts, scene& model,
                                                            const voxelize_request& request, voxelize_stats& stats,
                                                            voxelpipe::stage_times& times);
+
+// What --distance and --remesh ask for, on the first GPU. The scene stays whole; device_memory_error as above.
+[[nodiscard]] volume distances_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
+                                       voxelize_stats& stats);
+[[nodiscard]] surface_mesh remeshed_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
+                                            voxelize_stats& stats);
 
 // The GPU, where it can be used and, for the backend `automatic`, is the quicker way; stats.no_cuda says why not. Adds
 // the time that its start takes. Throws backend_error where the request insists on a GPU.

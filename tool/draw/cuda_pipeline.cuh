@@ -4,12 +4,17 @@
 // The tool's pipeline for cuda_backend: how it reads targets, and which file compiles which of its parts. nvcc takes
 // minutes for all kernels of the pipeline, so each part that draws is instantiated in a file of its own.
 
+#include "distance/distance_drawer.hpp"
 #include "model/parallel.hpp"
 #include "pipeline_solid.hpp"
 #include "pipeline_surface.hpp"
+#include "remesh/remesh_scene.hpp"
 #include "sparse/sparse_parts.hpp"
 
 #include <voxelpipe/device/surface_calls.cuh>
+#include <voxelpipe/distance/device/distance.cuh>
+#include <voxelpipe/distance/device/distance_at.cuh>
+#include <voxelpipe/surfaces/device/surfaces.cuh>
 
 #include <algorithm>
 #include <cstddef>
@@ -162,5 +167,9 @@ struct memory_access<vp::cuda_backend> {
 #define VOXELIZE_CUDA_BRICK_SOLID(HOW)                                                                                 \
     HOW template vp::status sparse_pipeline<vp::cuda_backend>::draw_solid_bits(const voxelpipe::grid&, sparse_volume&, \
                                                                                channel&);
+#define VOXELIZE_CUDA_DISTANCE(HOW)                                                                                    \
+    HOW template volume draw_distances(vp::cuda_backend&, scene&, const voxelize_request&, voxelize_stats&);
+#define VOXELIZE_CUDA_REMESH(HOW)                                                                                      \
+    HOW template surface_mesh remesh_scene(vp::cuda_backend&, scene&, const voxelize_request&, voxelize_stats&);
 
 } // namespace voxelize
