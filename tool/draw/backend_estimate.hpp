@@ -15,6 +15,7 @@ namespace voxelize {
 struct work_size {
     double triangles = 0;
     double fragments = 0;    // estimated: a voxel's side of the grid's box counts three times, each triangle twice
+    double samples = 0;      // that --distance looks for the nearest triangle of
     bool shaded = false;     // colours, normals, numbers or depths, not only bits and counts
     double model_bytes = 0;  // vertices, indices and texels
     double result_bytes = 0; // of the volume, or of its bricks

@@ -46,7 +46,14 @@ __global__ void work_out(T* out, std::size_t first, std::size_t count, const Val
 // Host memory that the device writes directly, for two pieces on their way from it.
 class staging {
 public:
-    static constexpr std::size_t size = std::size_t{32} << 20; // bytes of a piece
+    static constexpr std::size_t most = std::size_t{32} << 20; // bytes of a piece
+
+    // Bytes of the pieces of that many: an eighth of them or fewer, since making this memory takes longer than a copy
+    // of it.
+    [[nodiscard]] static std::size_t piece_of(std::size_t bytes) {
+        constexpr std::size_t least = std::size_t{1} << 20, parts = 8;
+        return std::clamp(bytes / parts / least * least, least, most);
+    }
 
     // Made when it is first used, and freed when the thread ends.
     static staging& of_this_thread() {
@@ -58,12 +65,15 @@ public:
 
     // Begins to copy piece 0 or 1 from the device.
     void copy(std::size_t piece, const void* from, std::size_t bytes, cudaStream_t stream) {
-        if (!memory_[piece]) {
+        if (size_[piece] < bytes) {
+            memory_[piece].reset();
+            size_[piece] = 0;
             void* memory = nullptr;
-            check(cudaMallocHost(&memory, size));
+            check(cudaMallocHost(&memory, bytes));
             memory_[piece].reset(static_cast<std::byte*>(memory));
-            check(cudaEventCreateWithFlags(&is_there_[piece], cudaEventDisableTiming));
+            size_[piece] = bytes;
         }
+        if (is_there_[piece] == nullptr) check(cudaEventCreateWithFlags(&is_there_[piece], cudaEventDisableTiming));
         check(cudaMemcpyAsync(memory_[piece].get(), from, bytes, cudaMemcpyDeviceToHost, stream));
         check(cudaEventRecord(is_there_[piece], stream));
     }
@@ -88,6 +98,7 @@ private:
     }
 
     std::unique_ptr<std::byte, unpin> memory_[2];
+    std::size_t size_[2] = {};
     cudaEvent_t is_there_[2] = {};
 };
 
@@ -101,7 +112,7 @@ struct memory_access<vp::cuda_backend> {
 
     template <class T, class Value>
     static void read(vp::cuda_backend& backend, T* out, std::size_t count, const Value& value, int threads) {
-        constexpr std::size_t piece = gpu::staging::size / sizeof(T);
+        const std::size_t piece = gpu::staging::piece_of(count * sizeof(T)) / sizeof(T);
         const std::size_t pieces = (count + piece - 1) / piece;
         constexpr std::size_t little = std::size_t{4}
                                        << 20; // bytes that are there before memory could be made for them
@@ -133,8 +144,7 @@ struct memory_access<vp::cuda_backend> {
     template <class T>
     [[nodiscard]] static std::vector<T> list(vp::cuda_backend& backend, const T* from, std::size_t count) {
         std::vector<T> copied(count);
-        gpu::check(cudaMemcpyAsync(copied.data(), from, count * sizeof(T), cudaMemcpyDeviceToHost, backend.stream));
-        gpu::check(cudaStreamSynchronize(backend.stream));
+        if (count != 0) read(backend, copied.data(), count, as_it_is<T>{from}, thread_count(0));
         return copied;
     }
 };

@@ -120,10 +120,12 @@ private:
         const voxelpipe::grid part = this->uploaded_->relative_grid();
         if (surface_ && part.offset == surface_part_.offset && part.extent == surface_part_.extent) return *surface_;
         surface_part_ = part;
+        const int threads = thread_count(this->request_.threads);
         if constexpr (memory_access<Backend>::on_host)
-            return surface_.emplace(surface_of(*this->uploaded_));
+            return surface_.emplace(surface_of(*this->uploaded_, threads));
         else
-            return surface_.emplace(surface_of(model_, part, this->uploaded_->reference(), this->draws_lines_));
+            return surface_.emplace(
+                surface_of(model_, part, this->uploaded_->reference(), this->draws_lines_, threads));
     }
     // As many slabs as keep within the working memory at `bytes_of_voxel` a voxel; a slab that does not is halved, down
     // to a tile's height. Their borders are borders of bricks. draw(slab, most) returns false, without having done
