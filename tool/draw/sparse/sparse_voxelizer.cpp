@@ -27,6 +27,22 @@ namespace voxelize {
 
 namespace slabs = voxelpipe::slabs;
 
+namespace {
+
+// True if values of a large grid take longer to be held, most of them empty, than the bricks of a surface take. Files
+// that hold the whole grid are written from bricks, too. Bricks of a grid that is full take more than the grid, so
+// there has to be room for them.
+bool is_quicker_in_bricks(const voxelize_request& request, double dense_need, double room) {
+    constexpr double large = 256 << 20, most_in_bricks = 4; // bytes, times those of a dense grid
+    const bool has_values = std::any_of(request.targets.begin(), request.targets.end(),
+                                        [](target id) { return id != target::occupancy && id != target::count; });
+    const bool is_free = request.devices == 1 && request.strategy == voxelpipe::strategy::automatic;
+    return has_values && is_free && !request.solid && volume_bytes(request) >= large &&
+           most_in_bricks * dense_need <= room;
+}
+
+} // namespace
+
 storage_decision choose_storage(storage_choice choice, const voxelize_request& request,
                                 std::span<const std::filesystem::path> outputs, const dense_needs& dense) {
     if (choice == storage_choice::dense || request.wants_cells()) return {};
@@ -35,7 +51,8 @@ storage_decision choose_storage(storage_choice choice, const voxelize_request& r
     const bool needs_bricks = bricks_alone != outputs.end();
     const auto room = static_cast<double>(memory::room());
     const bool insists = choice == storage_choice::sparse;
-    if (!insists && !needs_bricks && dense.all <= room) return {};
+    if (!insists && !needs_bricks && dense.all <= room)
+        return {is_quicker_in_bricks(request, dense.all, room), false, ""};
     if (insists) return {true, true, ""};
     return {true, dense.alone > room,
             needs_bricks ? std::string(find_format(*bricks_alone)->extension) + " holds occupied voxels alone"
