@@ -66,7 +66,7 @@ private:
 
 } // namespace core
 
-// As remesh, with the same bytes and counts (at a level counters::voxels are those of the band), in memory in
+// As remesh, with the same bytes and counts (at a level counters::fragments are those of the band), in memory in
 // proportion to the triangles, the surface and the crossings of the mesh with the rows of samples along each axis;
 // bits, or a field, of the whole grid are not held. It takes longer where these fit. repair::exterior floods the whole
 // grid, with a byte or less a sample.

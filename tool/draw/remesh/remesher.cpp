@@ -9,7 +9,7 @@
 #include "model/parallel.hpp"
 
 #include <cpu_ref/backend.hpp>
-#include <voxelpipe/surfaces/remesh.hpp>
+#include <voxelpipe/surfaces/remesh_sparse.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -124,7 +124,8 @@ void fill_normals(surface_mesh& mesh) {
     }
 }
 
-surface_mesh remesh_scene(vp::cpu_backend& on, scene& model, const voxelize_request& request, voxelize_stats& stats) {
+surface_mesh remesh_scene(vp::cpu_backend& on, scene& model, const voxelize_request& request, const remesh_memory& need,
+                          voxelize_stats& stats) {
     wanted_targets wanted;
     wanted[static_cast<std::size_t>(target::color)] = request.wants(target::color) && has_colors(model);
     const bool is_colored = wanted.any();
@@ -133,7 +134,9 @@ surface_mesh remesh_scene(vp::cpu_backend& on, scene& model, const voxelize_requ
     std::vector<draw> draws;
     for (const auto& d : uploaded.draws()) draws.push_back({d.mesh, d.vertex_shader, {d.fragment_shader}});
     vp::surface<vp::cpu_backend, glm::vec4, glm::vec3> made(on);
-    const vp::status status = vp::remesh(on, draws, uploaded.relative_grid(), made, remesh_options_of(*request.remesh));
+    const vp::remesh_options options = remesh_options_of(*request.remesh);
+    const vp::status status = need.in_bricks ? vp::remesh_sparse(on, draws, uploaded.relative_grid(), made, options)
+                                             : vp::remesh(on, draws, uploaded.relative_grid(), made, options);
     if (status.code == vp::status_code::out_of_memory) throw std::bad_alloc{};
     status.or_throw();
     surface_mesh result;
@@ -170,25 +173,61 @@ surface_mesh remesh_scene(vp::cpu_backend& on, scene& model, const voxelize_requ
     return result;
 }
 
+// How often the model's triangles cross the rows of samples along the three axes, about: their areas as seen along
+// these.
+double crossings_of(const scene& model, const vp::grid& grid) {
+    double crossings = 0;
+    std::vector<glm::dvec3> placed;
+    for (const instance& shown : model.instances) {
+        const primitive& part = model.primitives[shown.primitive];
+        if (part.triangles.empty()) continue;
+        placed.clear();
+        for (const glm::vec3& p : part.positions) {
+            glm::dvec3 voxel = shown.to_world(glm::dvec3(p));
+            for (int a = 0; a < 3; ++a) voxel[a] /= grid.voxel_size[a];
+            placed.push_back(voxel);
+        }
+        for (const glm::uvec3& t : part.triangles) {
+            const glm::dvec3 u = placed[t.y] - placed[t.x], v = placed[t.z] - placed[t.x];
+            const double seen =
+                std::abs(u.y * v.z - u.z * v.y) + std::abs(u.z * v.x - u.x * v.z) + std::abs(u.x * v.y - u.y * v.x);
+            if (std::isfinite(seen)) crossings += seen / 2;
+        }
+    }
+    return crossings;
+}
+
 } // namespace
 
-double remesh_need(const scene& model, const voxelize_request& request) {
-    const glm::dvec3 n(request.grid.extent);
-    const double samples = n.x * n.y * n.z;
+remesh_memory remesh_need(const scene& model, const voxelize_request& request) {
+    const remesh_request& wanted = *request.remesh;
     const double triangles = static_cast<double>(model.triangle_count()),
                  vertices = static_cast<double>(model.vertex_count());
-    // The bits, or the field, and a word for each row of 32 cells.
-    double bytes = samples * (request.remesh->level != 0 ? 4.0 + 2.0 / 8 : 2.0 / 8);
-    bytes += vertices * 84 + triangles * 64;
-    // Cells, crossings, vertices and faces with their values, of a surface as large as three times the grid's.
-    constexpr double cell_bytes = 300;
-    bytes += 6 * (n.x * n.y + n.y * n.z + n.z * n.x) * cell_bytes;
-    return bytes;
+    const glm::dvec3 n(request.grid.extent);
+    const double samples = n.x * n.y * n.z, crossings = crossings_of(model, request.grid);
+    // Crossings with rows are listed and sorted. Cells, vertices and faces have their values; walls that repairs make,
+    // and the two sides of sheets at a level, are as large as the model, about.
+    constexpr double crossing_bytes = 24, cell_bytes = 150;
+    const double cells = std::min(samples, crossings * (wanted.sign.is_repaired() || wanted.level != 0 ? 2 : 1));
+    remesh_memory need;
+    need.bytes = vertices * 84 + triangles * 64 + crossings * crossing_bytes + cells * cell_bytes;
+    if (wanted.sign.vote || wanted.sign.rule == solid_rule::exterior) need.bytes += samples * 3 / 8;
+    if (wanted.level != 0) {
+        // The field of the grid with its bits, or the samples of the band in lists, then in bricks.
+        constexpr double grid_bytes = 4.25, brick_bytes = 60;
+        const double largest =
+            std::max({request.grid.voxel_size.x, request.grid.voxel_size.y, request.grid.voxel_size.z});
+        const double band = std::min(samples, crossings * 2 * (std::abs(wanted.level) / largest + 2));
+        need.in_bricks = band * brick_bytes < samples * grid_bytes;
+        need.bytes += need.in_bricks ? band * brick_bytes : samples * grid_bytes;
+    }
+    return need;
 }
 
 surface_mesh run_remesher(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
     require_cpu(request, "--remesh runs on the CPU alone", stats);
-    const double need = remesh_need(model, request);
+    const remesh_memory how = remesh_need(model, request);
+    const double need = how.bytes;
     const glm::ivec3 extent = request.grid.extent;
     memory::expect(need);
     memory::require(need,
@@ -206,7 +245,7 @@ surface_mesh run_remesher(scene&& model, const voxelize_request& request, voxeli
         stats.slabs = 1;
         stats.triangles = model.triangle_count();
         const auto start = std::chrono::steady_clock::now();
-        surface_mesh result = remesh_scene(on, model, request, stats);
+        surface_mesh result = remesh_scene(on, model, request, how, stats);
         const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - start;
         stats.milliseconds.emplace_back("remesh", time.count());
         return result;
