@@ -4,10 +4,11 @@
 // Surfaces on the device: the bytes and counters of cpu_backend.
 
 #include "../surfaces/slab_support.hpp"
+#include "../surfaces/sparse_support.hpp"
 #include "../surfaces/value_support.hpp"
 
 #include <cpu_ref/backend.hpp>
-#include <voxelpipe/surfaces/device/surfaces.cuh>
+#include <voxelpipe/surfaces/device/sparse_surfaces.cuh>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <gtest/gtest.h>
@@ -16,9 +17,6 @@ using namespace surface_tests;
 
 namespace {
 
-vp::grid grid_around_models(const glm::ivec3& extent) {
-    return vp::fit(vp::bounding_box{glm::dvec3(0.0), glm::dvec3(1.0)}, extent);
-}
 void expect_same(const host_mesh& m, const vp::grid& g, const vp::remesh_options& o) {
     vp::cuda_backend gpu;
     vp::cpu_backend cpu;
@@ -124,6 +122,44 @@ TEST(DeviceSurfaces, ValuesHaveTheBytesOfTheCpu) {
             EXPECT_TRUE(a.mesh.status.ok()) << a.mesh.status.message();
             EXPECT_GT(a.at.size(), 50u);
             EXPECT_TRUE(a.has_same_arrays(b));
+        }
+    }
+}
+
+TEST(DeviceSurfaces, OfBricksHaveTheBytesOfTheCpu) {
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    vp::grid whole = grid_of(glm::ivec3(50, 47, 45));
+    const vp::grid g = whole.crop(glm::ivec3(5, 8, 3), glm::ivec3(45, 39, 42));
+    const auto at = [&](double x, double y, double z) { return glm::vec3(g.to_world(glm::dvec3(x, y, z))); };
+    host_mesh m = box(at(3, 8, 13), at(35, 24, 29)); // tiles of 8 and 16 voxels at its faces
+    m.add(ball(at(22, 30, 30), 9.0f, 2));
+    for (const vp::extract_options& o :
+         {vp::extract_options{}, vp::extract_options{.border = vp::border::open, .quads = true, .min_component = 9}}) {
+        const both_surfaces a = extract_solid(gpu, m, g, o), b = extract_solid(cpu, m, g, o);
+        EXPECT_TRUE(a.are_the_same());
+        EXPECT_TRUE(a.sparse.has_same_arrays(b.sparse));
+        EXPECT_GT(a.tiles, 2u);
+        EXPECT_GT(a.sparse.vertices.size(), 2000u);
+    }
+    std::mt19937 random(6);
+    const bit_volume v = random_volume(random, g.extent, 0.02);
+    EXPECT_TRUE(extract_solid(gpu, cubes(v, g), g).are_the_same());
+}
+
+TEST(DeviceSurfaces, RemeshedInBricksHaveTheBytesOfTheGrid) {
+    vp::cuda_backend gpu;
+    for (std::uint32_t seed = 0; seed < 3; ++seed) {
+        const host_mesh m = bad_model(seed);
+        const vp::grid g = grid_around_models(glm::ivec3(18, 21, 19));
+        for (const vp::remesh_options& o :
+             {vp::remesh_options{}, vp::remesh_options{.repair = vp::repair::close_holes, .embedded = true},
+              vp::remesh_options{.sample = vp::sample::corner, .repair = vp::repair::exterior, .quads = true},
+              vp::remesh_options{.level = 0.05}, vp::remesh_options{.level = -0.05}}) {
+            const host_surface a = remesh_sparse(gpu, m, g, o), b = remesh(gpu, m, g, o);
+            EXPECT_TRUE(a.status.ok()) << a.status.message();
+            EXPECT_TRUE(a.has_same_arrays(b)) << seed << " " << o.level;
+            EXPECT_EQ(a.status.solid, b.status.solid);
         }
     }
 }

@@ -282,4 +282,9 @@ template <class Backend>
     return m;
 }
 
+// Around bad_model and needles.
+[[nodiscard]] inline vp::grid grid_around_models(const glm::ivec3& extent) {
+    return vp::fit(vp::bounding_box{glm::dvec3(0.0), glm::dvec3(1.0)}, extent);
+}
+
 } // namespace surface_tests

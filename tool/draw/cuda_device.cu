@@ -202,11 +202,11 @@ volume distances_on_cuda(const cuda_facts& facts, scene& model, const voxelize_r
     return result;
 }
 
-surface_mesh remeshed_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
+surface_mesh remeshed_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request, bool in_bricks,
                               voxelize_stats& stats) {
     one_gpu gpu(facts, request, stats);
     surface_mesh result;
-    gpu.run([&] { result = remesh_scene(gpu.backend(), model, request, stats); });
+    gpu.run([&] { result = remesh_scene(gpu.backend(), model, request, in_bricks, stats); });
     return result;
 }
 

@@ -103,7 +103,7 @@ struct device_memory_error : memory_error {
 [[nodiscard]] volume distances_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
                                        voxelize_stats& stats);
 [[nodiscard]] surface_mesh remeshed_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
-                                            voxelize_stats& stats);
+                                            bool in_bricks, voxelize_stats& stats);
 
 // The GPU, where it can be used and, for the backend `automatic`, is the quicker way; stats.no_cuda says why not. Adds
 // the time that its start takes. Throws backend_error where the request insists on a GPU.

@@ -14,7 +14,7 @@
 #include <voxelpipe/device/surface_calls.cuh>
 #include <voxelpipe/distance/device/distance.cuh>
 #include <voxelpipe/distance/device/distance_at.cuh>
-#include <voxelpipe/surfaces/device/surfaces.cuh>
+#include <voxelpipe/surfaces/device/sparse_surfaces.cuh>
 
 #include <algorithm>
 #include <cstddef>
@@ -180,6 +180,6 @@ struct memory_access<vp::cuda_backend> {
 #define VOXELIZE_CUDA_DISTANCE(HOW)                                                                                    \
     HOW template volume draw_distances(vp::cuda_backend&, scene&, const voxelize_request&, voxelize_stats&);
 #define VOXELIZE_CUDA_REMESH(HOW)                                                                                      \
-    HOW template surface_mesh remesh_scene(vp::cuda_backend&, scene&, const voxelize_request&, voxelize_stats&);
+    HOW template surface_mesh remesh_scene(vp::cuda_backend&, scene&, const voxelize_request&, bool, voxelize_stats&);
 
 } // namespace voxelize

@@ -17,7 +17,7 @@ volume distances_on_cuda(const cuda_facts& facts, scene&, const voxelize_request
     throw backend_error(why_not(facts));
 }
 
-surface_mesh remeshed_on_cuda(const cuda_facts& facts, scene&, const voxelize_request&, voxelize_stats&) {
+surface_mesh remeshed_on_cuda(const cuda_facts& facts, scene&, const voxelize_request&, bool, voxelize_stats&) {
     throw backend_error(why_not(facts));
 }
 

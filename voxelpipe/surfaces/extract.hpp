@@ -47,7 +47,7 @@ template <class Backend, class T, class Blend, class Layout, class Finish>
         } else {
             typename Backend::template buffer<edge_crossing> crossings(backend, cells.num_edges());
             backend.for_each(cells.count(),
-                             passes::cross_field<target_view<target<T, Blend, Layout>>>{
+                             passes::cross_field<passes::cell_list, target_view<target<T, Blend, Layout>>>{
                                  cells.list(), from, options.level, crossings.data(), counts.data() + 1});
             const std::vector<std::uint64_t> host = counts.to_host(backend);
             result.surface.nan_samples = host[0];

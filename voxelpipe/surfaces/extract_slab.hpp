@@ -65,9 +65,9 @@ template <class Backend>
 
     vertices all(backend, cells.num_vertices());
     quads all_quads(backend, cells.num_edges());
-    backend.for_each(cells.count(),
-                     passes::place_vertices{cells.list(), options.place, crossings, all.data(), nullptr, nullptr});
-    backend.for_each(cells.count(), passes::list_quads{cells.list(), all_quads.data()});
+    backend.for_each(cells.count(), passes::place_vertices<passes::cell_list>{cells.list(), options.place, crossings,
+                                                                              all.data(), nullptr, nullptr});
+    backend.for_each(cells.count(), passes::list_quads<passes::cell_list>{cells.list(), all_quads.data()});
     surface<Backend> made(backend);
     made.samples = whole;
     made.vertices = vertices(backend, num_vertices);

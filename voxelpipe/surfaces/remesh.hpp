@@ -85,10 +85,9 @@ namespace core {
 }
 
 // The crossings of the mesh with the edges that its surface crosses.
-template <int Axis, class Backend>
-void find_mesh_crossings(Backend& backend, const surface_cells<Backend>& cells, const gathered_mesh<Backend>& mesh,
-                         const grid& samples, const remesh_options& options, edge_crossing* crossings,
-                         std::uint64_t* counts) {
+template <int Axis, class Backend, class Cells>
+void find_mesh_crossings(Backend& backend, const Cells& cells, const gathered_mesh<Backend>& mesh, const grid& samples,
+                         const remesh_options& options, edge_crossing* crossings, std::uint64_t* counts) {
     using numbers = typename Backend::template buffer<std::uint64_t>;
     using words = typename Backend::template buffer<std::uint32_t>;
     const passes::row_keys<Axis> rows(samples.extent);
@@ -113,32 +112,28 @@ void find_mesh_crossings(Backend& backend, const surface_cells<Backend>& cells, 
     list.triangles = found.data();
     backend.for_each(triangles.count, list);
     backend.sort_by_key(keys, found, rows.key_bits());
-    numbers first_of_row(backend, rows.rows() + 1);
-    backend.for_each(rows.rows() + 1, passes::find_rows{keys.data(), total, rows.bits, first_of_row.data()});
-    backend.for_each(cells.count(),
-                     passes::cross_mesh<Axis>{cells.list(), triangles, rows, first_of_row.data(), keys.data(),
-                                              found.data(), crossing_rule(options), options.bodies == bodies::draw,
-                                              samples.fraction(), crossings, counts});
+    numbers first_of_row(backend, Cells::is_sparse ? 0 : rows.rows() + 1); // in bricks nothing has the grid's size
+    backend.for_each(first_of_row.size(), passes::find_rows{keys.data(), total, rows.bits, first_of_row.data()});
+    backend.for_each(cells.count(), passes::cross_mesh<Axis, typename Cells::list_type>{
+                                        cells.list(), triangles, rows, Cells::is_sparse ? nullptr : first_of_row.data(),
+                                        keys.data(), total, found.data(), crossing_rule(options),
+                                        options.bodies == bodies::draw, samples.fraction(), crossings, counts});
 }
 
-// Level 0: the sign of the samples, then the crossings of the mesh itself, then shade(mesh, cells, crossings,
-// counters), whose status counts where it is not ok.
-template <class Backend, class Mesh, class VertexShader, class Shade>
-[[nodiscard]] status
-remesh_exactly(Backend& backend, std::span<const draw<Mesh, VertexShader, constant_output<bool>>> draws,
-               const grid& samples, const remesh_options& options, surface<Backend>& out, const Shade& shade) {
-    solid_options sign = sign_options(options);
-    std::vector<hole_cones> cones;
-    framebuffer<Backend, target<bit, blend::replace>> inside(backend, samples.extent);
-    status result = voxelize_solid(backend, draws, samples, inside, sign);
-    if (!result.ok()) return result;
-    const surface_cells<Backend> cells(backend, get<0>(inside.view().targets).elements, samples.extent);
+// The surface of cells between samples whose sign is known: the crossings of the mesh itself, then shade(mesh, cells,
+// crossings, counters), whose status counts where it is not ok. `result` is that of the sign.
+template <class Backend, class Mesh, class VertexShader, class Cells, class Shade>
+[[nodiscard]] status remesh_cells(Backend& backend,
+                                  std::span<const draw<Mesh, VertexShader, constant_output<bool>>> draws,
+                                  const grid& samples, const remesh_options& options, const Cells& cells,
+                                  surface<Backend>& out, const Shade& shade, status result) {
     if (cells.are_too_many()) return too_many_vertices(cells.num_vertices());
     if (cells.count() == 0) {
         out = surface<Backend>(backend);
         out.samples = samples;
         return result;
     }
+    std::vector<hole_cones> cones;
     if (options.repair == repair::close_holes)
         cones = run_module(find_holes_tag{}, backend, draws, samples, options.bodies, options.max_hole_edges);
     typename Backend::template buffer<edge_crossing> crossings(backend, cells.num_edges());
@@ -158,32 +153,59 @@ remesh_exactly(Backend& backend, std::span<const draw<Mesh, VertexShader, consta
     return shaded.ok() ? result : shaded;
 }
 
-// Another level: of the distance.
-template <class Backend, class Mesh, class VertexShader, class Shade>
-[[nodiscard]] status remesh_level(Backend& backend, std::span<const draw<Mesh, VertexShader, distance>> draws,
-                                  const grid& g, const remesh_options& options, surface<Backend>& out,
-                                  const Shade& shade) {
-    const grid samples = sample_grid(g, options.sample);
-    framebuffer<Backend, target<float, blend::replace>> field(backend, samples.extent);
-    const status drawn = voxelize_distance(backend, draws, g, field, level_options(options, g));
+// The surface of a level, whose field `drawn` counted, of extract(grid of samples, out, options).
+template <class Backend, class Mesh, class VertexShader, class Extract, class Shade>
+[[nodiscard]] status remesh_field(Backend& backend, std::span<const draw<Mesh, VertexShader, distance>> draws,
+                                  const grid& samples, const remesh_options& options, surface<Backend>& out,
+                                  const Shade& shade, const status& drawn, const Extract& extract) {
     if (!drawn.ok()) return drawn;
     if (drawn.counts.triangles_in == 0) { // the field is clear, not far away
         out = surface<Backend>(backend);
         out.samples = samples;
         return drawn;
     }
-    status result = extract(backend, field, samples, out, extract_options_of(options));
+    status result = extract(samples, out, extract_options_of(options));
     if (!result.ok()) return result;
     result.counts = drawn.counts;
     result.solid = drawn.solid;
     result.distance = drawn.distance;
     if constexpr (Shade::has_values) {
         const gathered_mesh<Backend> mesh(backend, draws, samples, {}, options.bodies);
-        const status shaded = shade(mesh.view(), nullptr, nullptr, result.surface);
+        constexpr const surface_cells<Backend>* no_cells = nullptr;
+        const status shaded = shade(mesh.view(), no_cells, nullptr, result.surface);
         if (!shaded.ok()) return shaded;
     }
     return result;
 }
+
+// Samples are those of the whole grid.
+struct remesh_in_grid {
+    // Level 0: the sign of the samples, then the rest.
+    template <class Backend, class Mesh, class VertexShader, class Shade>
+    [[nodiscard]] static status
+    run(Backend& backend, std::span<const draw<Mesh, VertexShader, constant_output<bool>>> draws, const grid& g,
+        const remesh_options& options, surface<Backend>& out, const Shade& shade) {
+        const grid samples = sample_grid(g, options.sample);
+        framebuffer<Backend, target<bit, blend::replace>> inside(backend, samples.extent);
+        const status result = voxelize_solid(backend, draws, samples, inside, sign_options(options));
+        if (!result.ok()) return result;
+        const surface_cells<Backend> cells(backend, get<0>(inside.view().targets).elements, samples.extent);
+        return remesh_cells(backend, draws, samples, options, cells, out, shade, result);
+    }
+    // Another level: of the distance.
+    template <class Backend, class Mesh, class VertexShader, class Shade>
+    [[nodiscard]] static status run(Backend& backend, std::span<const draw<Mesh, VertexShader, distance>> draws,
+                                    const grid& g, const remesh_options& options, surface<Backend>& out,
+                                    const Shade& shade) {
+        const grid samples = sample_grid(g, options.sample);
+        framebuffer<Backend, target<float, blend::replace>> field(backend, samples.extent);
+        const status drawn = voxelize_distance(backend, draws, g, field, level_options(options, g));
+        const auto extract_field = [&](const grid& of, surface<Backend>& to, const extract_options& how) {
+            return extract(backend, field, of, to, how);
+        };
+        return remesh_field(backend, draws, samples, options, out, shade, drawn, extract_field);
+    }
+};
 
 // Makes the values of a surface; without any it does nothing.
 template <class Backend, class Mesh, class VertexShader, class Shader, class... Values>
@@ -195,8 +217,9 @@ struct surface_shading {
     double level;
     surface<Backend, Values...>& made;
 
-    status operator()(const passes::mesh_triangles& triangles, const surface_cells<Backend>* cells,
-                      const edge_crossing* crossings, surface_counters& counts) const {
+    template <class Cells>
+    status operator()(const passes::mesh_triangles& triangles, const Cells* cells, const edge_crossing* crossings,
+                      surface_counters& counts) const {
         if constexpr (has_values)
             return shade_surface(backend, draws, where, triangles, cells, crossings, level, made, counts);
         else
@@ -223,6 +246,33 @@ template <class Mesh, class VertexShader, class Shader, class... Values>
     }
 }
 
+// Runs a remesh; Way::run takes the draws with constant(true) for the surface itself, with distance for a level.
+template <class Way, class Backend, class Mesh, class VertexShader, class Shader, class... Values>
+[[nodiscard]] status run_remesh(Backend& backend, std::span<const draw<Mesh, VertexShader, Shader>> draws,
+                                const grid& g, surface<Backend, Values...>& out, const remesh_options& options) {
+    if constexpr (makes_values<Mesh, VertexShader, Shader, Values...>()) {
+        if (const status s = voxelpipe::validate(g); !s.ok()) return s;
+        if (const status s = validate(options, g); !s.ok()) return s;
+        if (const status s = validate_draws(draws); !s.ok()) return s;
+        return backend.guard([&]() -> status {
+            surface<Backend, Values...> made(backend);
+            const surface_shading<Backend, Mesh, VertexShader, Shader, Values...> shade{backend, draws, g,
+                                                                                        options.level, made};
+            const auto run = [&]<class Drawn>(const Drawn& shader) {
+                std::vector<draw<Mesh, VertexShader, Drawn>> drawn;
+                for (const auto& d : draws) drawn.push_back({d.mesh, d.vertex_shader, shader});
+                return Way::run(backend, std::span<const draw<Mesh, VertexShader, Drawn>>(drawn), g, options, made,
+                                shade);
+            };
+            const status result = options.level != 0.0 ? run(distance{}) : run(constant(true));
+            if (result.ok()) out = std::move(made);
+            return result;
+        });
+    } else {
+        return {}; // does not compile: a static_assert has said why
+    }
+}
+
 } // namespace core
 
 // Makes a closed manifold mesh around what lies inside of the draws' triangles: sign, then crossings, then sheets, then
@@ -241,33 +291,7 @@ template <class Mesh, class VertexShader, class Shader, class... Values>
 template <class Backend, class Mesh, class VertexShader, class Shader, class... Values>
 [[nodiscard]] status remesh(Backend& backend, std::span<const draw<Mesh, VertexShader, Shader>> draws, const grid& g,
                             surface<Backend, Values...>& out, const remesh_options& options = {}) {
-    if constexpr (core::makes_values<Mesh, VertexShader, Shader, Values...>()) {
-        if (const status s = validate(g); !s.ok()) return s;
-        if (const status s = core::validate(options, g); !s.ok()) return s;
-        if (const status s = core::validate_draws(draws); !s.ok()) return s;
-        return backend.guard([&]() -> status {
-            surface<Backend, Values...> made(backend);
-            const core::surface_shading<Backend, Mesh, VertexShader, Shader, Values...> shade{backend, draws, g,
-                                                                                              options.level, made};
-            status result;
-            if (options.level != 0.0) {
-                std::vector<draw<Mesh, VertexShader, distance>> measured;
-                for (const auto& d : draws) measured.push_back({d.mesh, d.vertex_shader, {}});
-                result = core::remesh_level(backend, std::span<const draw<Mesh, VertexShader, distance>>(measured), g,
-                                            options, made, shade);
-            } else {
-                std::vector<draw<Mesh, VertexShader, constant_output<bool>>> filled;
-                for (const auto& d : draws) filled.push_back({d.mesh, d.vertex_shader, constant(true)});
-                result = core::remesh_exactly(backend,
-                                              std::span<const draw<Mesh, VertexShader, constant_output<bool>>>(filled),
-                                              core::sample_grid(g, options.sample), options, made, shade);
-            }
-            if (result.ok()) out = std::move(made);
-            return result;
-        });
-    } else {
-        return {}; // does not compile: a static_assert has said why
-    }
+    return core::run_remesh<core::remesh_in_grid>(backend, draws, g, out, options);
 }
 
 // One mesh.

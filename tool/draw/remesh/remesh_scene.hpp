@@ -11,7 +11,7 @@
 #include "draw/voxelizer.hpp"
 #include "model/surface_mesh.hpp"
 
-#include <voxelpipe/surfaces/remesh.hpp>
+#include <voxelpipe/surfaces/remesh_sparse.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -126,10 +126,11 @@ inline void fill_normals(surface_mesh& mesh) {
     }
 }
 
-// The mesh that the request asks for. Adds the counts and the time. Throws std::bad_alloc, and std::runtime_error for
-// what the library refuses.
+// The mesh that the request asks for; in_bricks: its samples lie in bricks, which changes nothing of it. Adds the
+// counts and the time. Throws std::bad_alloc, and std::runtime_error for what the library refuses.
 template <class Backend>
-surface_mesh remesh_scene(Backend& on, scene& model, const voxelize_request& request, voxelize_stats& stats) {
+surface_mesh remesh_scene(Backend& on, scene& model, const voxelize_request& request, bool in_bricks,
+                          voxelize_stats& stats) {
     const auto start = std::chrono::steady_clock::now();
     wanted_targets wanted;
     wanted[static_cast<std::size_t>(target::color)] = request.wants(target::color) && has_colors(model);
@@ -139,7 +140,9 @@ surface_mesh remesh_scene(Backend& on, scene& model, const voxelize_request& req
     std::vector<draw> draws;
     for (const auto& d : uploaded.draws()) draws.push_back({d.mesh, d.vertex_shader, {d.fragment_shader}});
     vp::surface<Backend, glm::vec4, glm::vec3> made(on);
-    const vp::status status = vp::remesh(on, draws, uploaded.relative_grid(), made, remesh_options_of(*request.remesh));
+    const vp::remesh_options options = remesh_options_of(*request.remesh);
+    const vp::status status = in_bricks ? vp::remesh_sparse(on, draws, uploaded.relative_grid(), made, options)
+                                        : vp::remesh(on, draws, uploaded.relative_grid(), made, options);
     if (status.code == vp::status_code::out_of_memory) throw std::bad_alloc{};
     status.or_throw();
     surface_mesh result;

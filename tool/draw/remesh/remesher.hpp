@@ -9,8 +9,12 @@
 
 namespace voxelize {
 
-// Bytes that remeshing this model comes to, beyond those that are held before it, about.
-[[nodiscard]] double remesh_need(const scene& model, const voxelize_request& request);
+// What remeshing a model takes, about.
+struct remesh_memory {
+    double bytes = 0;      // beyond those that are held before it
+    bool in_bricks = true; // samples lie in bricks, not in a grid: the same mesh
+};
+[[nodiscard]] remesh_memory remesh_need(const scene& model, const voxelize_request& request);
 
 // request.remesh is set; request.grid is not cropped. Lines and points enclose nothing: a warning counts them. Nothing
 // inside gives an empty mesh, which a warning says. Throws memory_error with need and limit before anything is drawn,

@@ -116,16 +116,17 @@ public:
             bound_vertices{first_vertices_ + room_.cells, first_edges_ + room_.cells, room_.vertices, room_.quads,
                            state_},
             stream);
-        const cell_list list{cells, table_, first_of_word_, keys_, states_, first_vertices_, first_edges_};
+        const cell_list list{{cells, first_of_word_}, table_, keys_, states_, first_vertices_, first_edges_};
         if constexpr (!is_bit)
             run(room_.cells,
-                bounded<cross_field<view_type>>{
+                bounded<cross_field<cell_list, view_type>>{
                     {list, from_, options_.level, crossings_, &state_->counts.made_crossings}, &state_->cells},
                 stream);
         run(room_.cells,
-            bounded<place_vertices>{{list, options_.place, crossings_, vertices_, nullptr, nullptr}, &state_->cells},
+            bounded<place_vertices<cell_list>>{{list, options_.place, crossings_, vertices_, nullptr, nullptr},
+                                               &state_->cells},
             stream);
-        run(room_.cells, bounded<list_quads>{{list, quads_}, &state_->cells}, stream);
+        run(room_.cells, bounded<list_quads<cell_list>>{{list, quads_}, &state_->cells}, stream);
         choose_parts(stream);
         if (options_.quads) return;
         run(room_.quads,

@@ -65,7 +65,7 @@ struct bound_vertices {
 
 // flip_cells with zeros behind the cells.
 struct flip_bounded_cells {
-    flip_cells flips;
+    flip_cells<sample_bits> flips;
     const std::uint64_t* cells;
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         if (i < *cells)

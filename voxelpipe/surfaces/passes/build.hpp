@@ -19,68 +19,100 @@
 
 namespace voxelpipe::core {
 
-// The cells that a surface passes, with their sheets and crossed edges numbered.
+// Cells that a surface passes, with their sheets and crossed edges numbered. What lists them is derived from it.
 template <class Backend>
-class surface_cells {
-    template <class T>
-    using buffer = typename Backend::template buffer<T>;
-
+class numbered_cells {
 public:
-    // The samples are those of a grid of this extent; their memory outlives the object. Waits.
-    surface_cells(Backend& backend, const std::uint32_t* samples, const glm::ivec3& extent)
-        : backend_(backend), grid_{{samples, extent.x, extent.y, extent.z}},
-          table_(backend, array_view<const cell_sheets>(host_table())),
-          first_of_word_(backend, grid_.rows() * static_cast<std::uint64_t>(grid_.row_words())), keys_(backend, 0),
-          states_(backend, 0), first_vertices_(backend, 0), first_edges_(backend, 0) {
-        const std::uint64_t rows = grid_.rows();
-        buffer<std::uint64_t> first_of_row(backend, rows + 1);
-        {
-            buffer<std::uint32_t> counts(backend, rows + 1);
-            backend.for_each(rows + 1, passes::count_active_cells{grid_, counts.data()});
-            count_ = backend.sum(counts, first_of_row);
-        }
-        if (count_ > most) { // a cell has a vertex at least
-            num_vertices_ = count_;
-            return;
-        }
-        keys_ = buffer<std::uint64_t>(backend, count_);
-        states_ = buffer<std::uint16_t>(backend, count_);
-        backend.for_each(rows, passes::list_active_cells{grid_, first_of_row.data(), first_of_word_.data(),
-                                                         keys_.data(), states_.data()});
-        buffer<std::uint32_t> sheets(backend, count_ + 1), edges(backend, count_ + 1);
-        first_vertices_ = buffer<std::uint64_t>(backend, count_ + 1);
-        first_edges_ = buffer<std::uint64_t>(backend, count_ + 1);
-        backend.for_each(count_ + 1, passes::flip_cells{grid_.samples, table_.data(), keys_.data(), count_,
-                                                        states_.data(), sheets.data(), edges.data()});
-        num_vertices_ = backend.sum(sheets, first_vertices_);
-        num_edges_ = backend.sum(edges, first_edges_);
-    }
-
     [[nodiscard]] bool are_too_many() const { return num_vertices_ > most; }
     [[nodiscard]] std::uint64_t count() const { return count_; }
     [[nodiscard]] std::uint64_t num_vertices() const { return num_vertices_; }
     [[nodiscard]] std::uint64_t num_edges() const { return num_edges_; } // crossed ones, which are the quads
-    // Refers to the object.
-    [[nodiscard]] passes::cell_list list() const {
-        return {grid_,          table_.data(),          first_of_word_.data(), keys_.data(),
-                states_.data(), first_vertices_.data(), first_edges_.data()};
+
+protected:
+    template <class T>
+    using buffer = typename Backend::template buffer<T>;
+    static constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
+
+    explicit numbered_cells(Backend& backend)
+        : table_(backend, array_view<const cell_sheets>(host_table())), keys_(backend, 0), states_(backend, 0),
+          first_vertices_(backend, 0), first_edges_(backend, 0) {}
+
+    // Makes room for the keys and corners of cells; false: there are too many.
+    [[nodiscard]] bool make_room(Backend& backend, std::uint64_t count) {
+        count_ = count;
+        if (count_ > most) { // a cell has a vertex at least
+            num_vertices_ = count_;
+            return false;
+        }
+        keys_ = buffer<std::uint64_t>(backend, count_);
+        states_ = buffer<std::uint16_t>(backend, count_);
+        return true;
+    }
+    // Decides the flips of the listed cells; samples.corners(x, y, z) are those of any cell.
+    template <class Samples>
+    void number(Backend& backend, const Samples& samples) {
+        buffer<std::uint32_t> sheets(backend, count_ + 1), edges(backend, count_ + 1);
+        first_vertices_ = buffer<std::uint64_t>(backend, count_ + 1);
+        first_edges_ = buffer<std::uint64_t>(backend, count_ + 1);
+        backend.for_each(count_ + 1, passes::flip_cells<Samples>{samples, table_.data(), keys_.data(), count_,
+                                                                 states_.data(), sheets.data(), edges.data()});
+        num_vertices_ = backend.sum(sheets, first_vertices_);
+        num_edges_ = backend.sum(edges, first_edges_);
+    }
+    template <class Index>
+    [[nodiscard]] passes::indexed_cells<Index> list_by(const Index& index) const {
+        return {index, table_.data(), keys_.data(), states_.data(), first_vertices_.data(), first_edges_.data()};
     }
 
+    buffer<cell_sheets> table_;
+    buffer<std::uint64_t> keys_;
+    buffer<std::uint16_t> states_;
+
 private:
-    static constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
     static const std::array<cell_sheets, 512>& host_table() {
         static const std::array<cell_sheets, 512> table = make_cell_table();
         return table;
     }
 
-    Backend& backend_;
-    passes::cell_grid grid_;
-    buffer<cell_sheets> table_;
-    buffer<std::uint32_t> first_of_word_;
-    buffer<std::uint64_t> keys_;
-    buffer<std::uint16_t> states_;
     buffer<std::uint64_t> first_vertices_, first_edges_;
     std::uint64_t count_ = 0, num_vertices_ = 0, num_edges_ = 0;
+};
+
+// The cells of a grid of bits.
+template <class Backend>
+class surface_cells : public numbered_cells<Backend> {
+    using base = numbered_cells<Backend>;
+    template <class T>
+    using buffer = typename Backend::template buffer<T>;
+
+public:
+    using list_type = passes::cell_list; // what passes take
+    static constexpr bool is_sparse = false;
+
+    // The samples are those of a grid of this extent; their memory outlives the object. Waits.
+    surface_cells(Backend& backend, const std::uint32_t* samples, const glm::ivec3& extent)
+        : base(backend), grid_{{samples, extent.x, extent.y, extent.z}},
+          first_of_word_(backend, grid_.rows() * static_cast<std::uint64_t>(grid_.row_words())) {
+        const std::uint64_t rows = grid_.rows();
+        buffer<std::uint64_t> first_of_row(backend, rows + 1);
+        std::uint64_t count = 0;
+        {
+            buffer<std::uint32_t> counts(backend, rows + 1);
+            backend.for_each(rows + 1, passes::count_active_cells{grid_, counts.data()});
+            count = backend.sum(counts, first_of_row);
+        }
+        if (!base::make_room(backend, count)) return;
+        backend.for_each(rows, passes::list_active_cells{grid_, first_of_row.data(), first_of_word_.data(),
+                                                         base::keys_.data(), base::states_.data()});
+        base::number(backend, grid_.samples);
+    }
+
+    // Refers to the object.
+    [[nodiscard]] list_type list() const { return base::list_by(passes::word_index{grid_, first_of_word_.data()}); }
+
+private:
+    passes::cell_grid grid_;
+    buffer<std::uint32_t> first_of_word_;
 };
 
 // Leaves out what the options ask for, and counts components.
@@ -124,10 +156,11 @@ void choose_parts(Backend& backend, const extract_options& options, surface<Back
 }
 
 // Moves vertices of triangles that intersect to the mean, round by round.
-template <class Backend>
-void embed(Backend& backend, const surface_cells<Backend>& cells, const edge_crossing* crossings, place where,
-           surface<Backend>& out, surface_counters& counts) {
+template <class Backend, class Cells>
+void embed(Backend& backend, const Cells& cells, const edge_crossing* crossings, place where, surface<Backend>& out,
+           surface_counters& counts) {
     using numbers = typename Backend::template buffer<std::uint64_t>;
+    using list_type = typename Cells::list_type;
     typename Backend::template buffer<glm::uvec3> triangles(backend, 2 * out.quads.size());
     typename Backend::template buffer<std::uint32_t> marks(backend, out.vertices.size());
     numbers found(backend, static_cast<std::size_t>(passes::embed_count::count));
@@ -138,10 +171,11 @@ void embed(Backend& backend, const surface_cells<Backend>& cells, const edge_cro
         backend.for_each(found.size(), passes::clear_counts{found.data()});
         backend.for_each(out.quads.size(), passes::cut_quads{out.vertices.data(), out.quads.data(),
                                                              where == place::sharp, triangles.data()});
-        backend.for_each(cells.count(),
-                         passes::find_pairs{cells.list(), out.vertices.data(), triangles.data(), marks.data(), pairs});
-        const passes::place_vertices means{cells.list(), place::mean, crossings, out.vertices.data(), nullptr, nullptr};
-        backend.for_each(cells.count(), passes::move_to_mean{means, marks.data(), moved});
+        backend.for_each(cells.count(), passes::find_pairs<list_type>{cells.list(), out.vertices.data(),
+                                                                      triangles.data(), marks.data(), pairs});
+        const passes::place_vertices<list_type> means{cells.list(),        place::mean, crossings,
+                                                      out.vertices.data(), nullptr,     nullptr};
+        backend.for_each(cells.count(), passes::move_to_mean<list_type>{means, marks.data(), moved});
         const std::vector<std::uint64_t> host = found.to_host(backend);
         counts.intersecting_pairs = host[static_cast<std::size_t>(passes::embed_count::pairs)];
         const std::uint64_t moved_now = host[static_cast<std::size_t>(passes::embed_count::moved)];
@@ -153,19 +187,21 @@ void embed(Backend& backend, const surface_cells<Backend>& cells, const edge_cro
 
 // The surface of cells whose crossings are known; null: all in the middle of their edges. primitives: of the crossings'
 // triangles; null: vertices have no sources. Returns what the call returns, `result` with the surface's counts.
-template <class Backend>
-[[nodiscard]] status finish_surface(Backend& backend, const surface_cells<Backend>& cells, const grid& samples,
+template <class Backend, class Cells>
+[[nodiscard]] status finish_surface(Backend& backend, const Cells& cells, const grid& samples,
                                     const edge_crossing* crossings, const std::uint32_t* primitives,
                                     const extract_options& options, surface<Backend>& out, status result) {
+    using list_type = typename Cells::list_type;
     const bool has_sources = primitives != nullptr;
     surface<Backend> made(backend);
     made.samples = samples;
     made.vertices = typename Backend::template buffer<surface_vertex>(backend, cells.num_vertices());
     made.quads = typename Backend::template buffer<glm::uvec4>(backend, cells.num_edges());
     if (has_sources) made.sources = typename Backend::template buffer<std::uint32_t>(backend, cells.num_vertices());
-    backend.for_each(cells.count(), passes::place_vertices{cells.list(), options.place, crossings, made.vertices.data(),
-                                                           primitives, made.sources.data()});
-    backend.for_each(cells.count(), passes::list_quads{cells.list(), made.quads.data()});
+    backend.for_each(cells.count(),
+                     passes::place_vertices<list_type>{cells.list(), options.place, crossings, made.vertices.data(),
+                                                       primitives, made.sources.data()});
+    backend.for_each(cells.count(), passes::list_quads<list_type>{cells.list(), made.quads.data()});
     if (options.embedded) embed(backend, cells, crossings, options.place, made, result.surface);
     choose_parts(backend, options, made, result.surface);
     result.surface.vertices = made.vertices.size();

@@ -144,17 +144,11 @@ struct list_active_cells {
     }
 };
 
-// The cells that list_active_cells has listed, by position.
-struct cell_list {
+// Finds the cells that list_active_cells has listed by their word.
+struct word_index {
     cell_grid cells;
-    const cell_sheets* table;
     const std::uint32_t* first_of_word;
-    const std::uint64_t* keys;
-    const std::uint16_t* states;         // corners, and 256 if its joined face is flipped
-    const std::uint64_t* first_vertices; // of the cells' sheets
-    const std::uint64_t* first_edges;    // of the crossed edges that begin at the cells' lowest samples
 
-    // Number of a cell; it is active.
     [[nodiscard]] VOXELPIPE_HD std::uint32_t find(int x, int y, int z) const {
         const int w = x >> 5;
         const std::uint64_t word =
@@ -162,6 +156,20 @@ struct cell_list {
         const std::uint32_t below = cell_rows(cells.samples, w, y, z).active() & ((1u << (x & 31)) - 1);
         return first_of_word[word] + static_cast<std::uint32_t>(exact::count_ones(below));
     }
+};
+
+// The cells that a surface passes, in the order of their numbers. An index finds them by position.
+template <class Index>
+struct indexed_cells {
+    Index index;
+    const cell_sheets* table;
+    const std::uint64_t* keys;
+    const std::uint16_t* states;         // corners, and 256 if its joined face is flipped
+    const std::uint64_t* first_vertices; // of the cells' sheets
+    const std::uint64_t* first_edges;    // of the crossed edges that begin at the cells' lowest samples
+
+    // Number of a cell; it is active.
+    [[nodiscard]] VOXELPIPE_HD std::uint32_t find(int x, int y, int z) const { return index.find(x, y, z); }
     [[nodiscard]] VOXELPIPE_HD cell_sheets sheets(std::uint32_t cell) const { return table[states[cell]]; }
     // Number of the crossed edge along `axis` that begins at the cell's lowest sample.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t edge(std::uint32_t cell, int axis) const {
@@ -177,10 +185,15 @@ struct cell_list {
     }
 };
 
+// The cells of a grid of bits.
+using cell_list = indexed_cells<word_index>;
+
 // Decides the flips: a face both of whose segments lie in one sheet in both of its cells. Looks at samples alone, so
-// that all are decided on unflipped cells. Counts the sheets, and the crossed edges of the lowest sample.
+// that all are decided on unflipped cells. Counts the sheets, and the crossed edges of the lowest sample. `samples` has
+// corners(x, y, z) of any cell.
+template <class Samples>
 struct flip_cells {
-    sample_bits samples;
+    Samples samples;
     const cell_sheets* table;
     const std::uint64_t* keys;
     std::uint64_t count;

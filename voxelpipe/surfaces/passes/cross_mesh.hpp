@@ -20,13 +20,14 @@ namespace voxelpipe::core::passes {
 enum class edge_count : int { on_cones, made, count };
 
 // The crossed edges along Axis that begin at the lowest sample of cell i.
-template <int Axis>
+template <int Axis, class Cells>
 struct cross_mesh {
-    cell_list cells;
+    Cells cells;
     mesh_triangles mesh;
     row_keys<Axis> rows;
-    const std::uint64_t* first_of_row;
+    const std::uint64_t* first_of_row; // null: rows are looked for among the keys
     const std::uint64_t* keys;
+    std::uint64_t count; // of keys
     const std::uint32_t* triangles;
     fill_rule rule;
     bool each_draw; // inside of any draw
@@ -59,9 +60,12 @@ private:
     }
     [[nodiscard]] VOXELPIPE_HD static std::int64_t winding_of(std::uint64_t key) { return (key & 1) != 0 ? -1 : 1; }
 
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t begin_of(std::uint64_t row) const {
+        return first_of_row != nullptr ? first_of_row[row] : count_below(keys, count, row << rows.bits);
+    }
     [[nodiscard]] VOXELPIPE_HD edge_crossing find(const std::int64_t (&p)[3], bool goes_out) const {
         constexpr int u = row_keys<Axis>::u, v = row_keys<Axis>::v;
-        const std::uint64_t row = rows.row(p[u], p[v]), low = first_of_row[row], length = first_of_row[row + 1] - low;
+        const std::uint64_t row = rows.row(p[u], p[v]), low = begin_of(row), length = begin_of(row + 1) - low;
         // The first sample beyond these crossings is the edge's upper one.
         const std::uint64_t from = rows.key(row, p[Axis] + 1, false), to = rows.key(row, p[Axis] + 2, false);
         const stretch s{low, low + count_below(keys + low, length, from), low + count_below(keys + low, length, to)};

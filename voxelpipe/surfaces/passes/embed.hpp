@@ -30,8 +30,9 @@ struct start_marks {
 // The pairs of triangles that intersect properly, of two quads that have a vertex in cell i. Vertices lie inside of
 // their cells, so a quad lies in its four cells, and quads without a cell in common are apart. A pair of quads with
 // several belongs to the lowest one. All threads write the same value to a mark.
+template <class Cells>
 struct find_pairs {
-    cell_list cells;
+    Cells cells;
     const surface_vertex* vertices;
     const glm::uvec3* triangles; // 2 q and 2 q + 1 are quad q
     std::uint32_t* marks;
@@ -80,8 +81,9 @@ private:
 };
 
 // Moves the marked vertices of cell i to the mean, once.
+template <class Cells>
 struct move_to_mean {
-    place_vertices means; // by place::mean
+    place_vertices<Cells> means; // by place::mean
     std::uint32_t* marks;
     std::uint64_t* moved; // a count
 

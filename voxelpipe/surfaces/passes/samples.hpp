@@ -47,9 +47,9 @@ struct read_samples {
 
 // Where a field crosses the edges that begin at the lowest sample of cell i: t = d0 / (d0 - d1), d the values minus the
 // level. In the middle where that is no number from 0 to 1: next to a NaN, and at the faces of the grid.
-template <class View>
+template <class Cells, class View>
 struct cross_field {
-    cell_list cells;
+    Cells cells;
     View from;
     double level;
     edge_crossing* crossings;

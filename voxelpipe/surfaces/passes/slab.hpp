@@ -23,10 +23,10 @@ struct find_layers {
     layer_begin* begins;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const std::uint64_t row = cells.cells.row(0, first + static_cast<int>(i) * layers);
-        const std::uint64_t cell = row < cells.cells.rows()
-                                       ? cells.first_of_word[row * static_cast<std::uint64_t>(cells.cells.row_words())]
-                                       : count;
+        const cell_grid& all = cells.index.cells;
+        const std::uint64_t row = all.row(0, first + static_cast<int>(i) * layers);
+        const std::uint64_t cell =
+            row < all.rows() ? cells.index.first_of_word[row * static_cast<std::uint64_t>(all.row_words())] : count;
         begins[i] = {cells.first_vertices[cell], cells.first_edges[cell]};
     }
 };

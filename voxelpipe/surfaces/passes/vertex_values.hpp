@@ -54,9 +54,9 @@ struct row_weights {
 }
 
 // Shades the crossings of the edges that begin at the lowest sample of cell i.
-template <class Shading, class... Values>
+template <class Cells, class Shading, class... Values>
 struct shade_crossings {
-    cell_list cells;
+    Cells cells;
     const edge_crossing* crossings;
     Shading shading;
     crossing_value<Values...>* values;
@@ -96,9 +96,9 @@ template <class... Values>
 using value_arrays = pack<Values*...>;
 
 // Combines the values of the crossings of vertex i. missing[count] becomes 0, for a sum.
-template <class... Values>
+template <class Cells, class... Values>
 struct combine_values {
-    cell_list cells;
+    Cells cells;
     const surface_vertex* vertices;
     const crossing_value<Values...>* crossings;
     std::uint64_t count;
@@ -191,11 +191,11 @@ struct shade_nearest {
 
 // The values of a surface that has been made. `asked` are the draws with their fragment shaders, `g` the grid of the
 // call. cells and crossings: null for a level other than 0, whose vertices all take the nearest triangle's value.
-template <class Backend, class Mesh, class VertexShader, class Shader, class... Values>
+template <class Backend, class Mesh, class VertexShader, class Shader, class Cells, class... Values>
 [[nodiscard]] status shade_surface(Backend& backend, std::span<const draw<Mesh, VertexShader, Shader>> asked,
-                                   const grid& g, const passes::mesh_triangles& mesh,
-                                   const surface_cells<Backend>* cells, const edge_crossing* crossings, double level,
-                                   surface<Backend, Values...>& made, surface_counters& counts) {
+                                   const grid& g, const passes::mesh_triangles& mesh, const Cells* cells,
+                                   const edge_crossing* crossings, double level, surface<Backend, Values...>& made,
+                                   surface_counters& counts) {
     using shading_type = gathered_shading<Backend, Mesh, VertexShader, Shader>;
     using view_type = typename shading_type::view_type;
     using words = typename Backend::template buffer<std::uint32_t>;
@@ -213,10 +213,12 @@ template <class Backend, class Mesh, class VertexShader, class Shader, class... 
     words missing(backend, vertices + 1);
     if (cells != nullptr) {
         typename Backend::template buffer<passes::crossing_value<Values...>> values(backend, cells->num_edges());
-        backend.for_each(cells->count(), passes::shade_crossings<view_type, Values...>{cells->list(), crossings,
-                                                                                       shading.view(), values.data()});
-        backend.for_each(vertices + 1, passes::combine_values<Values...>{cells->list(), made.vertices.data(),
-                                                                         values.data(), vertices, out, missing.data()});
+        using cells_type = typename Cells::list_type;
+        backend.for_each(cells->count(), passes::shade_crossings<cells_type, view_type, Values...>{
+                                             cells->list(), crossings, shading.view(), values.data()});
+        backend.for_each(vertices + 1,
+                         passes::combine_values<cells_type, Values...>{cells->list(), made.vertices.data(),
+                                                                       values.data(), vertices, out, missing.data()});
     } else {
         backend.for_each(vertices + 1, passes::miss_all{vertices, missing.data()});
     }

@@ -16,8 +16,9 @@
 namespace voxelpipe::core::passes {
 
 // The vertices of cell i, one a sheet.
+template <class Cells>
 struct place_vertices {
-    cell_list cells;
+    Cells cells;
     voxelpipe::place where;
     const edge_crossing* crossings; // null: all in the middle of their edges
     surface_vertex* vertices;
@@ -66,8 +67,9 @@ struct place_vertices {
 
 // The quads of the crossed edges that begin at the lowest sample of cell i: one an edge, through the sheets that hold
 // it in its four cells, the lowest cell first, counter-clockwise seen from outside.
+template <class Cells>
 struct list_quads {
-    cell_list cells;
+    Cells cells;
     glm::uvec4* quads;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
