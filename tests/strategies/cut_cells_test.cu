@@ -8,6 +8,7 @@
 
 #include <voxelpipe/cells/device/cells.cuh>
 #include <voxelpipe/cells/device/sparse_cells.cuh>
+#include <voxelpipe/slabs/devices.cuh>
 #include <voxelpipe/slabs/stream.hpp>
 
 #include <cpu_ref/cells/sparse_cells.hpp>
@@ -174,6 +175,59 @@ TEST(DeviceCells, SlabsOfAStreamAreTheWhole) {
     EXPECT_TRUE(s.cells == expected.cells);
     EXPECT_GT(s.cells.cones, 0u);
     device_test::expect_same_bytes(vp::get<0>(whole).to_host(cpu), found, "slabs");
+}
+
+// Slabs of several GPUs, dense and sparse, with and without holes that are closed: the cpu's whole.
+TEST(DeviceCells, SlabsOfSeveralGpusAreTheWhole) {
+    namespace slabs = vp::slabs;
+    const vp::grid g = device_test::box_grid(glm::ivec3(26, 24, 27)).crop({1, 0, 2}, {24, 23, 24});
+    mesh_data open = device_test::ball({13, 12, 14}, 9.3f, 8);
+    open.triangles.erase(open.triangles.end() - 9, open.triangles.end() - 3);
+    using fractions = vp::target<float, vp::blend::replace>;
+    vp::cpu_backend cpu;
+    for (const vp::repair repair : {vp::repair::none, vp::repair::close_holes}) {
+        const vp::cell_options how{.count_open_edges = false, .repair = repair};
+        vp::sparse_framebuffer<vp::cpu_backend, fractions> whole(cpu, g.extent);
+        const vp::status expected = draw(cpu, {open}, g, vp::fraction{}, whole, how);
+        ASSERT_TRUE(expected.ok()) << expected.message();
+        EXPECT_EQ(expected.cells.cones != 0, repair == vp::repair::close_holes);
+        slabs::devices gpus(std::vector<int>{0, 0, 0}, false);
+        slabs::device_options options;
+        options.is_solid = true;
+        options.may_turn = false;
+        options.repair = repair;
+        slabs::device_slabs parts(gpus, g, vp::mesh_view<>{open.positions, open.triangles}, vp::passthrough{}, options);
+        auto dense = parts.make([](vp::cuda_backend& gpu, glm::ivec3 e) {
+            return one_target<vp::cuda_backend>{gpu, e};
+        });
+        auto bricks = parts.make([](vp::cuda_backend& gpu, glm::ivec3 e) {
+            return vp::sparse_framebuffer<vp::cuda_backend, fractions>{gpu, e};
+        });
+        ASSERT_EQ(dense.size(), 3u);
+        std::vector<float> values;
+        std::vector<vp::host_sparse<fractions>> hosts;
+        for (int call = 0; call < 2; ++call) {
+            const vp::status s = call == 0 ? parts.draw_cells(vp::fraction{}, dense, how)
+                                           : parts.draw_cells(vp::fraction{}, bricks, how);
+            ASSERT_TRUE(s.ok()) << s.message();
+            EXPECT_EQ(s.counts, expected.counts);
+            EXPECT_TRUE(s.cells == expected.cells);
+        }
+        for (std::size_t i = 0; i < dense.size(); ++i) {
+            const auto layers = vp::get<0>(dense[i]).to_host(gpus.backend(i));
+            values.insert(values.end(), layers.begin(), layers.end());
+            hosts.push_back(bricks[i].to_host(gpus.backend(i)));
+        }
+        const auto host = whole.to_host(cpu);
+        EXPECT_TRUE(vp::same_contents(vp::merge(std::span<const vp::host_sparse<fractions>>(hosts)), host));
+        const auto all = vp::get<0>(host).to_dense();
+        std::size_t at = 0, wrong = 0;
+        vp::for_each_voxel(all, [&](const glm::ivec3&, float value) { wrong += values[at++] != value; });
+        EXPECT_EQ(wrong, 0u);
+        vp::cell_options other = how;
+        other.axis = 1;
+        EXPECT_EQ(parts.draw_cells(vp::fraction{}, dense, other).code, vp::status_code::bad_cell_options);
+    }
 }
 
 // Bricks, tiles and values of both backends, of both ways to make them, and the values of a dense call.
