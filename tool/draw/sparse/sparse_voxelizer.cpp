@@ -27,7 +27,7 @@ namespace slabs = voxelpipe::slabs;
 
 storage_decision choose_storage(storage_choice choice, const voxelize_request& request,
                                 std::span<const std::filesystem::path> outputs, const dense_needs& dense) {
-    if (choice == storage_choice::dense || request.wants_cells()) return {};
+    if (choice == storage_choice::dense || (request.wants_cells() && choice != storage_choice::sparse)) return {};
     if (request.solid && request.solid->fill == solid_fill::nearest) return {}; // --sparse is refused before
     const auto bricks_alone = std::find_if(outputs.begin(), outputs.end(), is_sparse_format);
     const bool needs_bricks = bricks_alone != outputs.end();
