@@ -4,8 +4,8 @@
 // Slabs over MPI ranks, run by mpiexec with 1 to 4 of them: each rank compares its slab with one call that draws the
 // whole.
 
-#include "broken_scene.hpp"
 #include "box_mesh.hpp"
+#include "broken_scene.hpp"
 #include "rank_scene.hpp"
 
 #include <voxelpipe/slabs/mpi.hpp>
