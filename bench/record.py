@@ -36,6 +36,7 @@ REPORTS = {
     "gpu_distance.md": {"gpu_distance.csv": "distance.csv"},
     "gpu_surfaces.md": {"gpu_surfaces.csv": "surfaces.csv"},
     "gpu_cut_cells.md": {"gpu_cut_cells.csv": "cut_cells.csv"},
+    "cpu_cells.md": {"cpu_cells.csv": "cells.csv"},
     "cpu_sparse.md": {"cpu_sparse.csv": "sparse.csv"},
     "cpu_surfaces.md": {"cpu_surfaces.csv": "surfaces.csv"},
     "cpu_processor_time.md": {"cpu_processor_time.csv": "processor_time.csv"},

@@ -4,6 +4,7 @@
 
 // cpu_backend with all modules: what a program includes to voxelize on CPU threads.
 
+#include <cpu_ref/cells/sparse_cells.hpp>
 #include <cpu_ref/cells/voxelize_cells.hpp>
 #include <cpu_ref/cpu_backend.hpp>
 #include <cpu_ref/distance/distance_at.hpp>

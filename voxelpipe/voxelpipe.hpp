@@ -10,6 +10,7 @@
 #include <voxelpipe/blend.hpp>
 #include <voxelpipe/cells/cells.hpp>
 #include <voxelpipe/cells/links.hpp>
+#include <voxelpipe/cells/sparse_cells.hpp>
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/distance/distance.hpp>
 #include <voxelpipe/distance/distance_ray.hpp>

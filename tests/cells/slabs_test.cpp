@@ -8,7 +8,9 @@
 #include <voxelpipe/slabs/stream.hpp>
 
 #include <algorithm>
+#include <span>
 #include <utility>
+#include <vector>
 
 namespace {
 
@@ -111,6 +113,35 @@ TEST(CellSlabs, CloseTheHolesOfTheWhole) {
         expect_whole(m, g, how, {.num_slabs = 6, .repair = vp::repair::close_holes}, 6);
         expect_whole(m, g.crop({1, 2, 9}, {8, 7, 3}), how, {.num_slabs = 3, .repair = vp::repair::close_holes}, 3);
     }
+}
+
+// Sparse slabs, whose borders cut bricks, are merged to the bytes of one call.
+TEST(CellSlabs, OfBricksAreMergedToTheWhole) {
+    const vp::grid g = solids::unit_grid({36, 35, 37});
+    mesh m = solids::sphere({18, 17.5F, 18}, 15.25F, 3);
+    m.triangles.erase(m.triangles.begin() + 4);
+    using bricks = vp::sparse_framebuffer<vp::cpu_backend, vp::target<float, vp::blend::replace>>;
+    using host = vp::host_sparse<vp::target<float, vp::blend::replace>>;
+    const vp::cell_options how{.count_open_edges = false, .repair = vp::repair::close_holes};
+    vp::cpu_backend backend(2);
+    bricks whole(backend, g.extent);
+    const vp::status expected = vp::voxelize_cells(backend, m.view(), g, vp::passthrough{}, vp::fraction{}, whole, how);
+    ASSERT_TRUE(expected.ok()) << expected.message();
+    EXPECT_GT(whole.num_tiles(), 0u);
+    slabs::stream stream(backend, g, vp::passthrough{}, {.num_slabs = 4, .repair = vp::repair::close_holes});
+    ASSERT_TRUE(stream.add(m.view()).ok());
+    std::vector<host> parts;
+    const vp::status s = stream.draw_cells(
+        vp::fraction{},
+        [&](glm::ivec3 extent) {
+            return bricks{backend, extent};
+        },
+        [&](const slabs::slab&, const bricks& out) { parts.push_back(out.to_host(backend)); }, how);
+    ASSERT_TRUE(s.ok()) << s.message();
+    EXPECT_GE(parts.size(), 4u);
+    EXPECT_EQ(s.counts, expected.counts);
+    EXPECT_EQ(s.cells, expected.cells);
+    EXPECT_TRUE(vp::same_contents(vp::merge(std::span<const host>(parts)), whole.to_host(backend)));
 }
 
 TEST(CellSlabs, RefuseWhatTheyCannot) {

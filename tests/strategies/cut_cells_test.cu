@@ -7,8 +7,11 @@
 #include "solid_drawings.hpp"
 
 #include <voxelpipe/cells/device/cells.cuh>
+#include <voxelpipe/cells/device/sparse_cells.cuh>
+#include <voxelpipe/slabs/devices.cuh>
 #include <voxelpipe/slabs/stream.hpp>
 
+#include <cpu_ref/cells/sparse_cells.hpp>
 #include <cpu_ref/cells/voxelize_cells.hpp>
 
 #include <gtest/gtest.h>
@@ -172,6 +175,127 @@ TEST(DeviceCells, SlabsOfAStreamAreTheWhole) {
     EXPECT_TRUE(s.cells == expected.cells);
     EXPECT_GT(s.cells.cones, 0u);
     device_test::expect_same_bytes(vp::get<0>(whole).to_host(cpu), found, "slabs");
+}
+
+// Slabs of several GPUs, dense and sparse, with and without holes that are closed: the cpu's whole.
+TEST(DeviceCells, SlabsOfSeveralGpusAreTheWhole) {
+    namespace slabs = vp::slabs;
+    const vp::grid g = device_test::box_grid(glm::ivec3(26, 24, 27)).crop({1, 0, 2}, {24, 23, 24});
+    mesh_data open = device_test::ball({13, 12, 14}, 9.3f, 8);
+    open.triangles.erase(open.triangles.end() - 9, open.triangles.end() - 3);
+    using fractions = vp::target<float, vp::blend::replace>;
+    vp::cpu_backend cpu;
+    for (const vp::repair repair : {vp::repair::none, vp::repair::close_holes}) {
+        const vp::cell_options how{.count_open_edges = false, .repair = repair};
+        vp::sparse_framebuffer<vp::cpu_backend, fractions> whole(cpu, g.extent);
+        const vp::status expected = draw(cpu, {open}, g, vp::fraction{}, whole, how);
+        ASSERT_TRUE(expected.ok()) << expected.message();
+        EXPECT_EQ(expected.cells.cones != 0, repair == vp::repair::close_holes);
+        slabs::devices gpus(std::vector<int>{0, 0, 0}, false);
+        slabs::device_options options;
+        options.is_solid = true;
+        options.may_turn = false;
+        options.repair = repair;
+        slabs::device_slabs parts(gpus, g, vp::mesh_view<>{open.positions, open.triangles}, vp::passthrough{}, options);
+        auto dense = parts.make([](vp::cuda_backend& gpu, glm::ivec3 e) {
+            return one_target<vp::cuda_backend>{gpu, e};
+        });
+        auto bricks = parts.make([](vp::cuda_backend& gpu, glm::ivec3 e) {
+            return vp::sparse_framebuffer<vp::cuda_backend, fractions>{gpu, e};
+        });
+        ASSERT_EQ(dense.size(), 3u);
+        std::vector<float> values;
+        std::vector<vp::host_sparse<fractions>> hosts;
+        for (int call = 0; call < 2; ++call) {
+            const vp::status s = call == 0 ? parts.draw_cells(vp::fraction{}, dense, how)
+                                           : parts.draw_cells(vp::fraction{}, bricks, how);
+            ASSERT_TRUE(s.ok()) << s.message();
+            EXPECT_EQ(s.counts, expected.counts);
+            EXPECT_TRUE(s.cells == expected.cells);
+        }
+        for (std::size_t i = 0; i < dense.size(); ++i) {
+            const auto layers = vp::get<0>(dense[i]).to_host(gpus.backend(i));
+            values.insert(values.end(), layers.begin(), layers.end());
+            hosts.push_back(bricks[i].to_host(gpus.backend(i)));
+        }
+        const auto host = whole.to_host(cpu);
+        EXPECT_TRUE(vp::same_contents(vp::merge(std::span<const vp::host_sparse<fractions>>(hosts)), host));
+        const auto all = vp::get<0>(host).to_dense();
+        std::size_t at = 0, wrong = 0;
+        vp::for_each_voxel(all, [&](const glm::ivec3&, float value) { wrong += values[at++] != value; });
+        EXPECT_EQ(wrong, 0u);
+        vp::cell_options other = how;
+        other.axis = 1;
+        EXPECT_EQ(parts.draw_cells(vp::fraction{}, dense, other).code, vp::status_code::bad_cell_options);
+    }
+}
+
+// Bricks, tiles and values of both backends, of both ways to make them, and the values of a dense call.
+struct placeless {
+    static constexpr bool ignores_voxel = true;
+    VOXELPIPE_HD auto operator()(const vp::cell_fragment& f) const {
+        return vp::outputs(f.fraction, f.next_aperture, f.is_cut).discard_if((f.units & 7) == 5);
+    }
+};
+struct with_place {
+    VOXELPIPE_HD auto operator()(const vp::cell_fragment& f) const {
+        return placeless{}(f).discard_if((f.voxel.x + 3 * f.voxel.y) % 5 == 0);
+    }
+};
+using sum_target = vp::target<float, vp::blend::add>;
+using face_target = vp::target<std::int64_t, vp::blend::max>;
+using cut_target = vp::target<vp::bit, vp::blend::bit_or>;
+template <class Shader>
+static void expect_same_bricks(const std::vector<mesh_data>& meshes, const vp::grid& g, const vp::cell_options& o,
+                               bool loads) {
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    vp::framebuffer<vp::cpu_backend, sum_target, face_target, cut_target> dense(cpu, g.extent);
+    vp::sparse_framebuffer<vp::cpu_backend, sum_target, face_target, cut_target> a(cpu, g.extent);
+    vp::sparse_framebuffer<vp::cuda_backend, sum_target, face_target, cut_target> b(gpu, g.extent);
+    for (int call = 0; call < (loads ? 2 : 1); ++call) {
+        if (call == 1) {
+            vp::get<0>(dense).load();
+            vp::get<0>(a).load();
+            vp::get<0>(b).load();
+        }
+        const vp::status whole = draw(cpu, meshes, g, Shader{}, dense, o),
+                         expected = draw(cpu, meshes, g, Shader{}, a, o), found = draw(gpu, meshes, g, Shader{}, b, o);
+        ASSERT_TRUE(whole.ok()) << whole.message();
+        ASSERT_TRUE(expected.ok()) << expected.message();
+        ASSERT_TRUE(found.ok()) << found.message();
+        EXPECT_EQ(whole.counts, found.counts);
+        EXPECT_EQ(expected.counts, found.counts);
+        EXPECT_TRUE(whole.cells == found.cells);
+    }
+    const auto x = a.to_host(cpu), y = b.to_host(gpu);
+    EXPECT_TRUE(vp::same_contents(x, y));
+    EXPECT_EQ(x.is_tiled, y.is_tiled);
+    EXPECT_EQ(y.is_tiled, vp::core::ignores_voxel<Shader> && !loads);
+    const auto all = vp::get<0>(dense).to_host_target(cpu), of_bricks = vp::get<0>(y).to_dense();
+    std::size_t wrong = 0;
+    vp::for_each_voxel(all, [&](const glm::ivec3& v, float value) { wrong += of_bricks(v.x, v.y, v.z) != value; });
+    EXPECT_EQ(wrong, 0u);
+}
+
+TEST(DeviceCells, SparseFramebuffersHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{42, 33, 38};
+    mesh_data m = device_test::tied_bodies(30, 6, 2);
+    const std::vector<mesh_data> meshes{m, device_test::ball({20, 17, 18}, 15.3f, 9)};
+    const vp::grid g = device_test::box_grid(extent);
+    for (int axis = 0; axis < 3; ++axis) {
+        const vp::cell_options o{.bodies = axis == 1 ? vp::bodies::draw : vp::bodies::call, .axis = axis};
+        const vp::grid part = axis == 2 ? g.crop({3, 2, 5}, {37, 30, 31}) : g;
+        expect_same_bricks<placeless>(meshes, part, o, false);
+        expect_same_bricks<with_place>(meshes, part, o, false);
+    }
+    expect_same_bricks<placeless>(meshes, g, {}, true);
+    vp::cuda_backend gpu;
+    vp::sparse_framebuffer<vp::cuda_backend, vp::target<float, vp::blend::replace>> fb(gpu, extent);
+    fb.limit({2, 5});
+    EXPECT_EQ(draw(gpu, meshes, g, vp::fraction{}, fb, {}).code, vp::status_code::capacity_exceeded);
+    EXPECT_EQ(fb.num_bricks(), 0u);
+    EXPECT_TRUE(draw(gpu, {}, g, vp::fraction{}, fb, {}).ok());
 }
 
 // The lists of both backends, record by record. Returns the number of crossed links.

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 
@@ -365,7 +366,9 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
     refused({"-t", "fraction", "--solid", "nonzero", "--close-holes=few"}, "--close-holes takes the number of edges");
     refused({"-t", "fraction", "--coverage", "thin"}, "--coverage and --target fraction");
     refused({"-t", "fraction", "--alpha", "cutoff"}, "--alpha cutoff and --target fraction");
-    refused({"-t", "fraction", "--sparse"}, "--sparse and --target fraction");
+    refused({"-t", "fraction,occupancy", "--sparse"}, "fraction, area and centroid alone, not occupancy");
+    refused({"-t", "fraction", "--solid", "nonzero", "--sparse"}, "--sparse and --target fraction do not go together");
+    refused({"-t", "fraction", "--threshold", "0.5", "--sparse"}, "hexahedra take a dense grid", 1, "o.vtu");
     refused({"-t", "fraction", "--resume"}, "one piece of work");
     refused({"-t", "fraction", "--levels"}, "--levels and --target fraction", 1, "o.zarr");
     refused({"-t", "fraction", "--distance"}, "fraction does not go with --distance");
@@ -377,7 +380,7 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
         refused({"-t", "fraction", "--threshold", bad}, "--threshold takes a fraction above 0 and up to 1", 1, "o.msh");
     refused({"--clamp"}, "--clamp goes with --target fraction");
     refused({"-t", "area_vector", "--clamp"}, "--clamp goes with --target fraction");
-    refused({"-t", "area_vector", "--sparse"}, "--sparse and --target area_vector");
+    refused({"-t", "area_vector", "--sparse"}, "fraction, area and centroid alone, not area_vector");
     refused({"-t", "area_vector", "--resume"}, "--target area_vector is one piece of work");
     refused({"-t", "area_vector"}, "beside --target area_vector adds the inside", 1, "o.nvdb");
     refused({"-t", "area_vector"}, "slices hold one target, which is occupancy or fraction", 1, "{z}.png");
@@ -385,7 +388,6 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
     refused({"-t", "aperture_x,fraction"}, "--target aperture_x is the only target of a run");
     refused({"-t", "aperture_y", "--solid", "nonzero"}, "it holds voxels; .npy, .npz and .zarr take the faces of", 1,
             "o.vti");
-    refused({"-t", "area", "--sparse"}, "--sparse and --target area");
     refused({"-t", "centroid"}, "beside --target centroid adds the inside", 1, "o.nvdb");
     refused({"-t", "centroid", "--backend", "cuda"}, "--target centroid is drawn on the CPU alone", 5);
     refused({"-t", "fraction", "--backend", "cuda"}, "on the CPU alone", 5);
@@ -394,6 +396,63 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
     EXPECT_EQ(3, large.code) << large.err;
     EXPECT_NE(std::string::npos, large.err.find("300 MiB")) << large.err;
     EXPECT_FALSE(fs::exists(folder / "o.npy"));
+}
+
+// What is cut or inside, with the values of a dense run; files of all voxels are the same.
+TEST(Fraction, SparseGridsHaveTheValuesOfDenseOnes) {
+    const scratch_folder folder;
+    builder file;
+    add(file, tilted);
+    add(file, box({-3.5F, -3.5F, 2.5F}, {3.5F, 3.5F, 3.25F}));
+    for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{{}, {"--clamp", "-j", "3"}}) {
+        std::vector<std::string> dense{"-t", "fraction,area,centroid"};
+        dense.insert(dense.end(), more.begin(), more.end());
+        std::vector<std::string> sparse = dense;
+        sparse.push_back("--sparse");
+        for (const char* const output : {"d.npy", "d.vti"}) ASSERT_EQ(0, draw(folder, file, output, dense).code);
+        for (const char* const output : {"s.npy", "s.vti", "s.nvdb", "s.npz"}) {
+            const outcome drawn = draw(folder, file, output, sparse);
+            ASSERT_EQ(0, drawn.code) << drawn.err;
+        }
+        EXPECT_TRUE(read_file(folder / "s.vti") == read_file(folder / "d.vti"));
+        const array coords = read_npy(folder / "s.npy");
+        const std::size_t listed = coords.shape[0];
+        EXPECT_GT(listed, 400U);
+        for (const char* const name : {"fraction", "area", "centroid"}) {
+            const array all = read_npy(folder / ("d." + std::string(name) + ".npy")),
+                        found = read_npy(folder / ("s." + std::string(name) + ".npy"));
+            const std::size_t components = all.shape.size() == 4 ? 3 : 1;
+            double left = 0;
+            for (std::size_t i = 0; i < all.voxels() * components; ++i) left += std::abs(all.at<float>(i));
+            for (std::size_t n = 0; n < listed; ++n) {
+                const auto at = [&](std::size_t axis) { return coords.at<std::int32_t>(3 * n + axis); };
+                const auto voxel = static_cast<std::size_t>((at(2) * 16 + at(1)) * 16 + at(0));
+                for (std::size_t c = 0; c < components; ++c) {
+                    ASSERT_EQ(all.at<float>(voxel * components + c), found.at<float>(n * components + c)) << name;
+                    left -= std::abs(found.at<float>(n * components + c));
+                }
+            }
+            EXPECT_NEAR(0.0, left, 1e-9) << name; // nothing is where no voxel is
+        }
+    }
+    std::filesystem::create_directories(folder / "s");
+    std::filesystem::create_directories(folder / "d");
+    ASSERT_EQ(0, draw(folder, file, "s/{z}.png", {"-t", "fraction", "--sparse"}).code);
+    ASSERT_EQ(0, draw(folder, file, "d/{z}.png", {"-t", "fraction"}).code);
+    for (const char* const layer : {"0004.png", "0013.png"})
+        EXPECT_TRUE(read_file(folder / (std::string("s/") + layer)) == read_file(folder / (std::string("d/") + layer)))
+            << layer;
+    const auto stats = [&](const char* output, std::vector<std::string> arguments) {
+        arguments.insert(arguments.end(), {"-t", "fraction", "--stats", "json"});
+        return json::parse(draw(folder, file, output, arguments).out);
+    };
+    // Several files of one run: the list beside the grid of floats has the fractions too.
+    ASSERT_EQ(0, draw(folder, file, "t.npy", {"-t", "fraction", "--sparse", "-o", folder / "t.nvdb"}).code);
+    ASSERT_EQ(0, draw(folder, file, "u.npy", {"-t", "fraction", "--sparse"}).code);
+    EXPECT_TRUE(read_file(folder / "t.fraction.npy") == read_file(folder / "u.fraction.npy"));
+    const json a = stats("a.npy", {}), b = stats("b.npy", {"--sparse"});
+    EXPECT_EQ(a["fractions"], b["fractions"]);
+    EXPECT_EQ(a["voxels"], b["voxels"]);
 }
 
 // Bytes of a PNG file from its header on: width, height, bits, colours.

@@ -358,6 +358,8 @@ protected: // sparse_pipeline draws the same into bricks
     // Draws the channel of fractions into the volume itself, in one call: its sums run over whole rows, and each
     // triangle's parts are found once.
     void draw_cells(volume& result);
+    // Counts of cut cells, and what is to be said of them; COUNTS has the rows, and how many are open.
+    void note_cells(const vp::status& status, fraction_counts counts);
 
     // Counts the covered voxels whose resolved normal is 0.
     void count_cancelled_normals(const volume& result);

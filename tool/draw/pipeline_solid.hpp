@@ -300,6 +300,11 @@ void pipeline<Backend>::draw_cells(volume& result) {
                 backend_, values, num_voxels, [values](std::size_t i) { return std::clamp(values[i], 0.0F, 1.0F); },
                 thread_count(request_.threads));
     }
+    note_cells(status, counts);
+}
+
+template <class Backend>
+void pipeline<Backend>::note_cells(const vp::status& status, fraction_counts counts) {
     if (!draws_surface_ && !request_.solid) { // otherwise these are counts of what was drawn before
         stats_.triangles_dropped = status.counts.triangles_dropped();
         add_counts(status);

@@ -77,8 +77,8 @@ inline constexpr std::array all_targets{
 };
 
 inline constexpr std::size_t target_count = all_targets.size();
-// Those of surfaces and solids, dense and sparse. Two others go with --distance, and those of cut cells are dense
-// alone.
+// Those of surfaces and solids, dense and sparse. Two others go with --distance; those of cut cells are measured of
+// whole triangles.
 inline constexpr std::span target_table = std::span(all_targets).first<target_count - 9>();
 
 [[nodiscard]] constexpr const target_info& info_of(target id) { return all_targets[static_cast<std::size_t>(id)]; }

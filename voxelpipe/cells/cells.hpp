@@ -89,6 +89,7 @@ struct measured_cell : cell_fragment, core::value_of_cell<Values>... {};
 
 // Cell shader that returns the fraction: into one target of float.
 struct fraction {
+    static constexpr bool ignores_voxel = true; // sparse_cells.hpp makes tiles
     // The fragment's fraction.
     VOXELPIPE_HD output<float> operator()(const cell_fragment& f) const { return outputs(f.fraction); }
 };

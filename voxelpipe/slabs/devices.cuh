@@ -15,6 +15,7 @@
 
 #include <voxelpipe/slabs/device_bins.cuh>
 #include <voxelpipe/slabs/device_exterior.cuh>
+#include <voxelpipe/slabs/device_options.hpp>
 #include <voxelpipe/slabs/device_set.cuh>
 #include <voxelpipe/slabs/plan.hpp>
 #include <voxelpipe/slabs/resident_repairs.hpp>
@@ -34,28 +35,6 @@
 #include <vector>
 
 namespace voxelpipe::slabs {
-
-// How a grid is cut for several GPUs.
-struct device_options {
-    voxelize_options voxelize = {}; // of each slab's call
-    // Bytes of the targets for each voxel, which are cleared or filled by a call. 0 balances the triangles alone.
-    double voxel_bytes = 0;
-    // What a triangle costs, in bytes of memory that its GPU could fill in the same time.
-    double triangle_bytes = 512;
-    // Slabs begin at multiples of this: 8 for targets in bricks that are gathered, and for sparse framebuffers, whose
-    // bricks a border would cut.
-    int align = 1;
-    bool may_turn = true;  // false: slabs along z, which A-buffers and gather() need
-    bool is_solid = false; // for draw_solid: triangles beside the grid along x count too, and slabs are along y or z
-    // For draw_solid with this repair, which decides what triangles a slab needs; is_solid then, and slabs of vote and
-    // exterior are along z.
-    voxelpipe::repair repair = voxelpipe::repair::none;
-    // exterior: the host floods in any case, not only if the first GPU has no room for it.
-    bool floods_on_host = false;
-    // Bytes of host memory for that, about; beyond them it takes temporary files of this folder.
-    std::uint64_t memory = std::uint64_t{1} << 30;
-    std::string folder = "/tmp"; // of POSIX files
-};
 
 // One mesh in the slabs of several GPUs. Each GPU has all vertices, which its vertex shader sees as in one call, and
 // the triangles of its slab. An object is used by one thread at a time.
@@ -132,17 +111,39 @@ public:
         if (how.repair != options_.repair || how.slab != nullptr || how.cones != nullptr)
             return core::failure(status_code::bad_solid_options);
         if (const status s = core::validate(how, grid_); !s.ok()) return s;
-        try {
-            if (const status s = find_repair(how); !s.ok()) return s;
-        } catch (const std::bad_alloc&) {
-            return core::failure(status_code::out_of_memory, stage::coarse_raster);
-        }
+        if (const status s = find_repair(how); !s.ok()) return s;
         status s =
             draw_each(shader, outputs, [&](cuda_backend& gpu, auto draws, const grid& g, Output& out, std::size_t i) {
                 const solid_options of_slab = repairs_ ? repairs_->of(i, how) : how;
                 return voxelize_solid(gpu, draws, g, out, of_slab);
             });
         if (s.ok() && repairs_) repairs_->count(s.solid);
+        return s;
+    }
+
+    // Draws cut cells, if device_options::is_solid: the values, and the counts but for open_edges, of one
+    // voxelize_cells. Rows run along x (how.axis is 0). how.repair is that of device_options, none or close_holes;
+    // how.cones are found here, as for draw_solid. The caller includes the module's header for GPUs (cells/device).
+    // Outputs are framebuffers or sparse framebuffers. bad_cell_options: other slabs or options.
+    template <class CellShader, class Output>
+    [[nodiscard]] status draw_cells(const CellShader& shader, std::vector<Output>& outputs,
+                                    const cell_options& how = {}) {
+        if (const status s = core::validate(how); !s.ok()) return s;
+        if (!options_.is_solid || how.repair != options_.repair || how.cones != nullptr || how.axis != 0)
+            return core::failure(status_code::bad_cell_options);
+        solid_options holes;
+        holes.repair = how.repair;
+        holes.max_hole_edges = how.max_hole_edges;
+        if (const status s = find_repair(holes); !s.ok()) return s;
+        status s =
+            draw_each(shader, outputs, [&](cuda_backend& gpu, auto draws, const grid& g, Output& out, std::size_t i) {
+                cell_options of_slab = how;
+                of_slab.count_open_edges = false; // a slab has some of the triangles
+                if (repairs_) of_slab.cones = repairs_->of(i, holes).cones;
+                return voxelize_cells(gpu, draws, g, out, of_slab);
+            });
+        if (s.ok() && repairs_) repairs_->count(s.solid);
+        move_holes_to_cells(s);
         return s;
     }
 
@@ -308,7 +309,13 @@ private:
     }
     // What the repair of a call takes of all slabs.
     [[nodiscard]] status find_repair(const solid_options& how) {
-        if (!repairs_) return {};
+        try {
+            return repairs_ ? search_repair(how) : status{};
+        } catch (const std::bad_alloc&) {
+            return core::failure(status_code::out_of_memory, stage::coarse_raster);
+        }
+    }
+    [[nodiscard]] status search_repair(const solid_options& how) {
         if (!repairs_->needs_walls(how)) return repairs_->find(how, {});
         repairs_->drop_inside();
         if (!options_.floods_on_host) {

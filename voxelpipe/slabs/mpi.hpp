@@ -90,6 +90,20 @@ public:
         return draw_with(false, &how, [&](auto& stream) { return stream.draw_solid(shader, make, sink, how); });
     }
 
+    // Every rank. As stream::draw_cells: the fractions, and the counts but for open_edges, of one call. Holds what
+    // draw_solid holds for close_holes.
+    template <class CellShader, class Make, class Sink>
+    [[nodiscard]] status draw_cells(const CellShader& shader, const Make& make, const Sink& sink,
+                                    const cell_options& how = {}) {
+        if (const status s = core::validate(how); !s.ok()) return s;
+        if (!options_.is_solid || how.repair != options_.repair || how.cones != nullptr || how.axis != 0)
+            return core::failure(status_code::bad_cell_options);
+        solid_options holes;
+        holes.repair = how.repair;
+        holes.max_hole_edges = how.max_hole_edges;
+        return draw_with(false, &holes, [&](auto& stream) { return stream.draw_cells(shader, make, sink, how); });
+    }
+
     // After draw(): the slabs, by rank.
     [[nodiscard]] const plan& slabs() const { return plan_; }
     // Where the lists of a rank begin among those of all.
@@ -226,15 +240,42 @@ private:
         all.counts = {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], sums[8]};
         all.solid.open_rows = sums[9];
         all.solid.crossings = sums[10];
+        add_up_cells(drawn.cells, all.cells);
         // Holes are those of the whole mesh on every rank that has a slab.
-        std::array<std::uint64_t, 4> most{drawn.solid.max_winding, drawn.solid.hole_edges, drawn.solid.holes,
-                                          drawn.solid.cones};
+        std::array<std::uint64_t, 7> most{drawn.solid.max_winding, drawn.solid.hole_edges, drawn.solid.holes,
+                                          drawn.solid.cones,       drawn.cells.hole_edges, drawn.cells.holes,
+                                          drawn.cells.cones};
         MPI_Allreduce(MPI_IN_PLACE, most.data(), static_cast<int>(most.size()), MPI_UINT64_T, MPI_MAX, all_.comm());
         all.solid.max_winding = most[0];
         all.solid.hole_edges = most[1];
         all.solid.holes = most[2];
         all.solid.cones = most[3];
+        all.cells.hole_edges = most[4];
+        all.cells.holes = most[5];
+        all.cells.cones = most[6];
         return all;
+    }
+    // Every rank. The lower word of the volume goes in halves, so that the sum's carry is not lost.
+    void add_up_cells(const cell_counters& drawn, cell_counters& all) const {
+        std::array<std::uint64_t, 9> sums{drawn.volume_low & 0xffffffffu,
+                                          drawn.volume_low >> 32,
+                                          static_cast<std::uint64_t>(drawn.volume_high),
+                                          drawn.cut_voxels,
+                                          drawn.below_zero,
+                                          drawn.above_one,
+                                          drawn.open_rows,
+                                          drawn.cell_records,
+                                          drawn.lost_centroids};
+        MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_UINT64_T, MPI_SUM, all_.comm());
+        const std::uint64_t upper = sums[1] + (sums[0] >> 32);
+        all.volume_low = upper << 32 | (sums[0] & 0xffffffffu);
+        all.volume_high = static_cast<std::int64_t>(sums[2] + (upper >> 32));
+        all.cut_voxels = sums[3];
+        all.below_zero = sums[4];
+        all.above_one = sums[5];
+        all.open_rows = sums[6];
+        all.cell_records = sums[7];
+        all.lost_centroids = sums[8];
     }
 
     detail::ranks all_;

@@ -303,6 +303,12 @@ inline void add_drawn(status& all, const status& one) {
     c.cell_records += one.cells.cell_records;
     c.lost_centroids += one.cells.lost_centroids;
 }
+// The holes that a repair has counted are those of cut cells.
+inline void move_holes_to_cells(status& s) {
+    s.cells.hole_edges = std::exchange(s.solid.hole_edges, 0);
+    s.cells.holes = std::exchange(s.solid.holes, 0);
+    s.cells.cones = std::exchange(s.solid.cones, 0);
+}
 
 // The items [first, second) of `count` that one of several ranks or devices reads: contiguous, ascending with the rank,
 // of about equal number.

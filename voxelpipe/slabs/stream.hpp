@@ -14,7 +14,7 @@
 // triangles and more); vertex::index counts in the chunk. The fragment shader
 // sees what it sees in the whole call: triangle and primitive are numbers in the whole mesh.
 
-#include <voxelpipe/cells/cells.hpp>
+#include <voxelpipe/cells/sparse_cells.hpp>
 #include <voxelpipe/slabs/bins.hpp>
 #include <voxelpipe/slabs/plan.hpp>
 #include <voxelpipe/slabs/records.hpp>
@@ -158,9 +158,9 @@ public:
     }
     // Draws cut cells: the fractions, and the counts but for open_edges, of one voxelize_cells with the whole mesh,
     // which is one draw. The stream is made for solids (stream_options::is_solid), with how.repair as its repair;
-    // make gives framebuffers. Rows run along x (how.axis is 0), and slabs are along y or z. how.cones are found by
-    // the stream, and not given. Memory beyond the targets, which the budget does not count: as for voxelize_cells, of
-    // a slab's triangles. bad_cell_options: another stream or option.
+    // make gives framebuffers or sparse framebuffers. Rows run along x (how.axis is 0), and slabs are along y or z.
+    // how.cones are found by the stream, and not given. Memory beyond the targets, which the budget does not count: as
+    // for voxelize_cells, of a slab's triangles. bad_cell_options: another stream or option.
     template <class CellShader, class Make, class Sink>
     [[nodiscard]] status draw_cells(const CellShader& shader, const Make& make, const Sink& sink,
                                     const cell_options& how = {}) {
@@ -178,9 +178,7 @@ public:
                 of_slab.cones = repairs_.of(g, holes).cones;
                 return voxelize_cells(backend_, draws, g, out, of_slab);
             });
-            all.cells.hole_edges = std::exchange(all.solid.hole_edges, 0);
-            all.cells.holes = std::exchange(all.solid.holes, 0);
-            all.cells.cones = std::exchange(all.solid.cones, 0);
+            move_holes_to_cells(all);
             return all;
         });
     }

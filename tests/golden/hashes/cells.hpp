@@ -3,7 +3,7 @@
 #pragma once
 
 // Cut cells: fractions, apertures and sums of closed, open and broken meshes, by each axis, by draws and in a crop; all
-// that a shader can ask for; with holes closed; and links.
+// that a shader can ask for; with holes closed; bricks and tiles; and links.
 
 #include "cases.hpp"
 
@@ -62,6 +62,32 @@ void cell_measures(Backend& backend, digest& d, const std::vector<mesh_data>& bo
                         vp::target<std::uint32_t, vp::blend::bit_xor>>{backend, grid.extent});
 }
 
+// Bricks, with tiles where the shader ignores the voxel.
+struct placeless_cell {
+    static constexpr bool ignores_voxel = true;
+    VOXELPIPE_HD auto operator()(const vp::cell_fragment& f) const {
+        return vp::outputs(f.fraction, f.next_aperture, f.is_cut);
+    }
+};
+struct placed_cell {
+    VOXELPIPE_HD auto operator()(const vp::cell_fragment& f) const {
+        return placeless_cell{}(f).discard_if(f.voxel.x % 3 == 1);
+    }
+};
+template <class Backend, class Shader>
+void sparse_cell_values(Backend& backend, digest& d, const std::vector<mesh_data>& bodies, const vp::grid& grid,
+                        const vp::cell_options& options, const Shader& shader) {
+    std::vector<vp::mesh<Backend>> meshes;
+    for (const mesh_data& m : bodies) meshes.push_back(upload(backend, m));
+    std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, Shader>> draws;
+    for (const auto& m : meshes) draws.push_back({m.view(), {}, shader});
+    vp::sparse_framebuffer<Backend, vp::target<float, vp::blend::add>, vp::target<std::int64_t, vp::blend::max>,
+                           vp::target<vp::bit, vp::blend::bit_or>>
+        fb(backend, grid.extent);
+    add_counts(d, vp::voxelize_cells(backend, draws, grid, fb, options));
+    add_sparse_contents(d, fb.to_host(backend));
+}
+
 template <class Backend>
 void link_values(Backend& backend, digest& d, const std::vector<mesh_data>& bodies, const vp::grid& grid,
                  int neighbours) {
@@ -112,6 +138,17 @@ void add_cells(case_table<Backend>& cases) {
     vp::cell_options closed;
     closed.repair = vp::repair::close_holes;
     add("closed.open", of("open"), odd_grid(), closed);
+    vp::cell_options by_z = by_draws;
+    by_z.axis = 2;
+    cases.push_back({"cells.sparse.shells", [](Backend& backend, digest& d) {
+                         sparse_cell_values(backend, d, shells(), odd_grid(), {}, placeless_cell{});
+                     }});
+    cases.push_back({"cells.sparse.draws.axis.z.crop.shells", [by_z](Backend& backend, digest& d) {
+                         sparse_cell_values(backend, d, shells(), crop_of_odd_grid(), by_z, placeless_cell{});
+                     }});
+    cases.push_back({"cells.sparse.placed.soup", [soup = of("soup")](Backend& backend, digest& d) {
+                         sparse_cell_values(backend, d, soup, odd_grid(), {}, placed_cell{});
+                     }});
     const auto link = [&](const std::string& name, const std::vector<mesh_data>& bodies, const vp::grid& grid,
                           int neighbours) {
         cases.push_back({"cells.links." + name,

@@ -19,6 +19,7 @@
 #include "targets.hpp"
 
 #include <voxelpipe/cells/device/cells.cuh>
+#include <voxelpipe/cells/device/sparse_cells.cuh>
 #include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/distance/device/distance.cuh>
 #include <voxelpipe/label/device/label.cuh>

@@ -127,7 +127,7 @@ bool sparse_pipeline<Backend>::draw_surface(sparse_volume& result, const voxelpi
             break;
         case target::distance: // those of --distance alone, which draws no bricks
         case target::nearest:
-        case target::fraction: // of dense grids alone
+        case target::fraction: // not of surfaces
         case target::area_vector:
         case target::area:
         case target::centroid:

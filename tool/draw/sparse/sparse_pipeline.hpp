@@ -38,6 +38,8 @@ public:
         : base(backend, model, request, stats), model_{model} {}
 
     [[nodiscard]] sparse_volume run(const voxelpipe::grid& whole) override {
+        if constexpr (memory_access<Backend>::on_host)
+            if (this->request_.wants_cells()) return draw_cells(whole);
         require_part();
         sparse_volume result = surface_in(whole, this->num_passes());
         if (!this->request_.solid) return result;
@@ -221,6 +223,8 @@ private:
     [[nodiscard]] vp::status draw_solid_bits(const voxelpipe::grid& part, sparse_volume& result, channel& counts);
     // The solid's bricks and tiles, and the values of the surface where that lies in them: in bricks.
     [[nodiscard]] sparse_volume draw_solid(sparse_volume&& surface_of);
+    // What is cut or inside, in one call for the whole grid; on the CPU alone (sparse_voxelizer.cpp).
+    [[nodiscard]] sparse_volume draw_cells(const voxelpipe::grid& whole);
 
     template <class Framebuffer>
     void take_bricks(sparse_volume& result, const Framebuffer& framebuffer) {

@@ -97,6 +97,7 @@ std::string help_footer() {
         "  aperture_x, _y, _z, float32: how much of each face across the axis is inside, by itself alone, into .npy, "
         ".npz\n"
         "  and .zarr; for a grid of nz, ny, nx voxels aperture_x has the shape (nz, ny, nx + 1).\n"
+        "  With --sparse fraction, area and centroid keep what is cut or inside alone.\n"
         "  All are drawn on the CPU. --threshold makes hexahedra of the voxels whose fraction is at least so "
         "much.\n"
         "\nMANY MODELS (--list FILE)\n"

@@ -400,8 +400,23 @@ void understand_fractions(command_line& options, const raw_options& raw) {
     if (!raw.close_holes.empty()) options.voxelize.close_holes = edges_of_holes(raw);
     if (request.alpha == blend_alpha::cutoff)
         throw usage_error("--alpha cutoff" + together + "what is inside follows from whole triangles");
-    if (options.storage == storage_choice::sparse)
-        throw usage_error("--sparse" + together + "cut cells are drawn into a dense grid");
+    if (options.storage == storage_choice::sparse) {
+        // What .nvdb and .vdb ask for is what their grid of fractions has.
+        if (std::find(options.implied.begin(), options.implied.end(), target::occupancy) != options.implied.end() &&
+            std::all_of(options.outputs.begin(), options.outputs.end(), [](const auto& output) {
+                return find_format(output)->only_sparse || !find_format(output)->needs_occupancy;
+            })) {
+            std::erase(options.voxelize.targets, target::occupancy);
+            std::erase(options.implied, target::occupancy);
+        }
+        for (const target id : request.targets)
+            if (id != target::fraction && id != target::area && id != target::centroid)
+                throw usage_error("--sparse with cut cells takes the targets fraction, area and centroid alone, not " +
+                                  std::string(info_of(id).name));
+        if (request.solid) throw usage_error("--sparse" + together + "with --solid");
+        if (raw.threshold)
+            throw usage_error("--sparse and --threshold do not go together: hexahedra take a dense grid");
+    }
     if (options.by_slabs)
         throw usage_error(name + " is one piece of work: no --resume, and no processes that share a model");
     if (options.write.levels) throw usage_error("--levels" + together + "cut cells have no mip levels");
@@ -418,13 +433,16 @@ void understand_fractions(command_line& options, const raw_options& raw) {
     }
     for (const std::filesystem::path& output : options.outputs) {
         const format& f = *find_format(output);
-        const bool is_chosen = f.has_threshold && raw.threshold; // by the fractions
+        const bool is_chosen = (f.has_threshold && raw.threshold) || // by the fractions
+                               (f.only_sparse && options.storage == storage_choice::sparse);
         if ((f.only_sparse || f.has_threshold) && !is_chosen && !request.solid)
             throw usage_error('"' + output.string() +
                               "\": it holds occupied voxels alone, which are those of the surface; --solid nonzero "
                               "beside " +
                               name + " adds the inside" +
-                              (f.has_threshold ? ", --threshold takes voxels by their fractions" : ""));
+                              (f.has_threshold ? ", --threshold takes voxels by their fractions"
+                               : f.only_sparse ? ", --sparse takes what is cut or inside"
+                                               : ""));
     }
 }
 

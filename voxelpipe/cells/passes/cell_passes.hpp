@@ -4,7 +4,7 @@
 
 // voxelize_cells on any backend: list the terms of all triangles, sort them by row and voxel, sum and shade the rows.
 
-#include <voxelpipe/cells/passes/cell_rows.hpp>
+#include <voxelpipe/cells/passes/cell_walk.hpp>
 #include <voxelpipe/programs/passes/fragment_pool.hpp>
 #include <voxelpipe/solid/core/holes.hpp>
 #include <voxelpipe/surfaces/passes/mesh_rows.hpp>
@@ -138,7 +138,8 @@ private:
         std::vector<hole_part> parts;
         for (std::size_t d = 0; d + 1 < begins_.size(); ++d) {
             const part_begin from = begins_[d], to = begins_[d + 1];
-            const auto vertices = to.vertex - from.vertex, count = to.triangle - from.triangle;
+            const auto vertices = static_cast<std::size_t>(to.vertex - from.vertex),
+                       count = static_cast<std::size_t>(to.triangle - from.triangle);
             // Bad indices are those of vertex 0, and no vertex of the draw then, or three times the same one.
             for (std::uint64_t i = from.triangle; i < to.triangle; ++i)
                 triangles[i] -= glm::uvec3(static_cast<std::uint32_t>(from.vertex));
@@ -254,77 +255,139 @@ private:
     return s;
 }
 
+// The terms of a call's triangles by row and voxel, and what shades them.
+template <class Backend, class CellShader>
+class listed_cells {
+    template <class T>
+    using buffer = typename Backend::template buffer<T>;
+
+public:
+    using walk_type = passes::cell_walk<CellShader>;
+    using terms_type = typename walk_type::terms_type;
+
+    // Runs the vertex shaders, unless list() is to fail for want of numbers.
+    template <class Draw>
+    listed_cells(Backend& backend, std::span<const Draw> draws, const grid& g, const cell_options& options,
+                 std::uint64_t triangles_in)
+        : backend_(backend), options_(options), triangles_in_(triangles_in), num_draws_(draws.size()),
+          offset_(g.offset), scene_(backend, draws, g, options.axis), keys_(backend, 0), order_(backend, 0),
+          terms_(backend, 0), shaders_(backend, 0), cursors_(backend, 0) {
+        std::vector<CellShader> shaders;
+        for (const auto& d : draws) shaders.push_back(d.fragment_shader);
+        shaders_ = buffer<CellShader>(backend, array_view<const CellShader>(shaders.data(), shaders.size()));
+    }
+
+    // Closes holes, then lists and sorts. Throws what the backend's buffers throw.
+    [[nodiscard]] status list() {
+        if (options_.repair == repair::close_holes) {
+            if (options_.cones != nullptr)
+                scene_.close_holes(options_.cones, options_.bodies == bodies::call ? 1 : num_draws_, holes_);
+            else
+                scene_.close_holes(options_.bodies, options_.max_hole_edges, holes_);
+        }
+        const std::uint64_t triangles = scene_.num_triangles();
+        const bool finds_edges = options_.count_open_edges;
+        if (finds_edges && 3 * triangles >= most) return fail(status_code::out_of_memory);
+        const glm::ivec3 extent = scene_.extent();
+        const auto wide = [](int n) { return static_cast<std::uint64_t>(n); };
+        keys_of_ = {wide(extent.x) + 2, wide(extent.y), options_.bodies == bodies::call ? 1 : num_draws_};
+        const uint128 num_keys = static_cast<uint128>(num_rows()) * keys_of_.bodies * keys_of_.slots;
+        if (num_keys >> 63 != 0) return fail(status_code::size_overflow);
+
+        buffer<std::uint64_t> first_term(backend_, triangles + 1);
+        std::uint64_t count = 0;
+        {
+            buffer<std::uint32_t> num_terms(backend_, triangles + 1);
+            backend_.for_each(triangles + 1,
+                              passes::count_cells<terms_type>{scene_.mesh(), num_terms.data(), scene_.counts()});
+            count = backend_.sum(num_terms, first_term);
+        }
+        if (finds_edges) scene_.count_open_edges();
+        if (count >= most) return fail(status_code::out_of_memory);
+        keys_ = buffer<std::uint64_t>(backend_, count);
+        order_ = buffer<std::uint32_t>(backend_, count);
+        terms_ = buffer<terms_type>(backend_, count);
+        backend_.for_each(triangles, passes::list_cells<terms_type>{scene_.mesh(), keys_of_, first_term.data(),
+                                                                    keys_.data(), order_.data(), terms_.data()});
+        backend_.sort_by_key(keys_, order_, static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys))));
+        return {};
+    }
+    // Looks at the sums of the rows of the grid, or of `count` listed ones.
+    [[nodiscard]] status measure(std::uint64_t count, const std::uint64_t* rows = nullptr) {
+        constexpr std::uint64_t safe = std::uint64_t{1} << 19; // triangles whose covers cannot wrap
+        backend_.for_each(count * keys_of_.bodies,
+                          passes::measure_rows<terms_type>{terms(), scene_.num_triangles() >= safe, counts(), rows});
+        return result();
+    }
+    // What goes along rows, of which there are `places` at a time.
+    [[nodiscard]] walk_type walk(std::uint64_t places) {
+        using cursor = typename walk_type::cursor;
+        if (keys_of_.bodies != 1) cursors_ = buffer<cursor>(backend_, places * keys_of_.bodies);
+        return {terms(), scene_.mesh(), shaders_.data(),  keys_of_.bodies == 1 ? nullptr : cursors_.data(),
+                offset_, options_.axis, scene_.extent().x};
+    }
+
+    // The status so far: of a call that has succeeded, or what failed.
+    [[nodiscard]] status result() const {
+        status s = make_cell_status(scene_.read_counts(), options_, triangles_in_, terms_.size());
+        s.cells.hole_edges = s.ok() ? holes_.hole_edges : 0;
+        s.cells.holes = s.ok() ? holes_.holes : 0;
+        s.cells.cones = s.ok() ? holes_.cones : 0;
+        return s;
+    }
+    [[nodiscard]] std::uint64_t num_rows() const {
+        return static_cast<std::uint64_t>(scene_.extent().y) * static_cast<std::uint64_t>(scene_.extent().z);
+    }
+    [[nodiscard]] std::uint64_t* counts() { return scene_.counts(); }
+    [[nodiscard]] passes::record_list<terms_type> terms() {
+        return {keys_of_, keys_.data(), order_.data(), terms_.data(), terms_.size()};
+    }
+    [[nodiscard]] status fail(status_code code) const {
+        status s = failure(code, stage::coarse_raster);
+        s.counts.triangles_in = triangles_in_;
+        return s;
+    }
+
+    static constexpr std::uint64_t most = std::uint64_t{1} << 32; // vertices, edges and terms are numbered in 32 bits
+
+private:
+    Backend& backend_;
+    cell_options options_;
+    std::uint64_t triangles_in_, num_draws_;
+    glm::ivec3 offset_;
+    cell_scene<Backend> scene_;
+    cell_counters holes_;
+    passes::cell_keys keys_of_{};
+    buffer<std::uint64_t> keys_;
+    buffer<std::uint32_t> order_;
+    buffer<terms_type> terms_;
+    buffer<CellShader> shaders_; // of the bodies
+    buffer<typename walk_type::cursor> cursors_;
+};
+
+// True if vertices are too many to be numbered; `failed` says so then.
+template <class Backend, class Draw>
+[[nodiscard]] bool has_too_many_vertices(std::span<const Draw> draws, std::uint64_t triangles_in, status& failed) {
+    if (cell_scene<Backend>::num_vertices(draws) >> 32 == 0) return false;
+    failed = failure(status_code::out_of_memory, stage::coarse_raster);
+    failed.counts.triangles_in = triangles_in;
+    return true;
+}
+
 // Implements voxelize_cells on any backend. Arguments are validated. Throws what the backend's buffers throw.
 template <class Backend, class Mesh, class VertexShader, class CellShader, class... Targets>
 [[nodiscard]] status run_cells(Backend& backend, std::span<const draw<Mesh, VertexShader, CellShader>> draws,
                                const grid& g, const framebuffer_view<Targets...>& fb, const cell_options& options,
                                std::uint64_t triangles_in) {
-    constexpr std::uint64_t most = std::uint64_t{1} << 32;
-    const auto fail = [&](status_code code) {
-        status s = failure(code, stage::coarse_raster);
-        s.counts.triangles_in = triangles_in;
-        return s;
-    };
-    // Vertices and edges are numbered in 32 bits.
-    if (cell_scene<Backend>::num_vertices(draws) >= most) return fail(status_code::out_of_memory);
-    cell_scene<Backend> scene(backend, draws, g, options.axis);
-    cell_counters holes;
-    if (options.repair == repair::close_holes) {
-        if (options.cones != nullptr)
-            scene.close_holes(options.cones, options.bodies == bodies::call ? 1 : draws.size(), holes);
-        else
-            scene.close_holes(options.bodies, options.max_hole_edges, holes);
-    }
-    const std::uint64_t triangles = scene.num_triangles();
-    const bool finds_edges = options.count_open_edges;
-    if (finds_edges && 3 * triangles >= most) return fail(status_code::out_of_memory);
-    const glm::ivec3 extent = scene.extent();
-    const auto wide = [](int n) { return static_cast<std::uint64_t>(n); };
-    const passes::cell_keys keys_of{wide(extent.x) + 2, wide(extent.y),
-                                    options.bodies == bodies::call ? 1 : std::uint64_t{draws.size()}};
-    const std::uint64_t rows = wide(extent.y) * wide(extent.z);
-    const uint128 num_keys = static_cast<uint128>(rows) * keys_of.bodies * keys_of.slots;
-    if (num_keys >> 63 != 0) return fail(status_code::size_overflow);
-
-    using words = typename Backend::template buffer<std::uint32_t>;
-    using numbers = typename Backend::template buffer<std::uint64_t>;
-    using terms_type = terms_of_needs<needs_of_cells<cell_fragment_of<CellShader>>>;
-    numbers first_term(backend, triangles + 1);
-    std::uint64_t count = 0;
-    {
-        words num_terms(backend, triangles + 1);
-        backend.for_each(triangles + 1,
-                         passes::count_cells<terms_type>{scene.mesh(), num_terms.data(), scene.counts()});
-        count = backend.sum(num_terms, first_term);
-    }
-    if (finds_edges) scene.count_open_edges();
-    if (count >= most) return fail(status_code::out_of_memory);
-    numbers keys(backend, count);
-    words order(backend, count);
-    typename Backend::template buffer<terms_type> terms(backend, count);
-    backend.for_each(triangles, passes::list_cells<terms_type>{scene.mesh(), keys_of, first_term.data(), keys.data(),
-                                                               order.data(), terms.data()});
-    backend.sort_by_key(keys, order, static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys))));
-    const passes::record_list<terms_type> list{keys_of, keys.data(), order.data(), terms.data(), count};
-    constexpr std::uint64_t safe = std::uint64_t{1} << 19; // triangles whose covers cannot wrap
-    backend.for_each(rows * keys_of.bodies, passes::measure_rows<terms_type>{list, triangles >= safe, scene.counts()});
-    if (const status s = make_cell_status(scene.read_counts(), options, triangles_in, count); !s.ok()) return s;
-
+    status failed;
+    if (has_too_many_vertices<Backend>(draws, triangles_in, failed)) return failed;
+    listed_cells<Backend, CellShader> cells(backend, draws, g, options, triangles_in);
+    if (const status s = cells.list(); !s.ok()) return s;
+    if (const status s = cells.measure(cells.num_rows()); !s.ok()) return s;
     if (const status begun = begin_fold(backend, fb); !begun.ok()) return begun;
-    std::vector<CellShader> shaders;
-    for (const auto& d : draws) shaders.push_back(d.fragment_shader);
-    const typename Backend::template buffer<CellShader> of_bodies(
-        backend, array_view<const CellShader>(shaders.data(), shaders.size()));
-    typename Backend::template buffer<passes::cell_cursor<terms_type>> cursors(
-        backend, keys_of.bodies == 1 ? 0 : rows * keys_of.bodies);
-    backend.for_each(rows, passes::shade_cells<CellShader, Targets...>{
-                               list, scene.mesh(), of_bodies.data(), keys_of.bodies == 1 ? nullptr : cursors.data(), fb,
-                               g.offset, options.axis, extent.x, scene.counts()});
-    status s = make_cell_status(scene.read_counts(), options, triangles_in, count);
-    s.cells.hole_edges = holes.hole_edges;
-    s.cells.holes = holes.holes;
-    s.cells.cones = holes.cones;
-    return s;
+    backend.for_each(cells.num_rows(),
+                     passes::shade_cells<CellShader, Targets...>{cells.walk(cells.num_rows()), fb, cells.counts()});
+    return cells.result();
 }
 
 } // namespace voxelpipe::core

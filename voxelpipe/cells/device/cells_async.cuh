@@ -1,0 +1,340 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// voxelize_cells_async: as voxelize_cells into a framebuffer, without waits and allocations, so that a CUDA graph can
+// capture it and replay it with changed vertices. It works in the caller's memory, in arrays whose room is given; a
+// call that does not fit leaves every target as it was, and read_cells_status says what was needed.
+
+#include <voxelpipe/cells/device/cells.cuh>
+#include <voxelpipe/device/base/for_each.cuh>
+#include <voxelpipe/device/scene/key_sort.cuh>
+#include <voxelpipe/device/scene/prefix_sum.cuh>
+#include <voxelpipe/device/voxelize_async.cuh>
+#include <voxelpipe/surfaces/passes/bounded.hpp>
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace voxelpipe {
+
+// Room of a call with cut cells.
+struct cell_limits {
+    // Pairs of a triangle and a voxel that meet, below 2^32 - 1: cell_counters::cell_records of the same call.
+    std::uint64_t records = 0;
+};
+
+// The caller's memory, as workspace_view.
+struct cell_workspace_view {
+    void* memory = nullptr; // on the device, aligned to 256 bytes
+    std::size_t bytes = 0;  // at least cell_workspace_bytes(...)
+    cell_limits limits;     // that `bytes` was computed for
+};
+
+namespace device {
+
+// At the start of the workspace.
+struct cell_state {
+    pipeline_state call; // its index_error stops what follows
+    std::uint64_t counts[core::index_of(core::cell_count::size)];
+    std::uint64_t all_records; // that there are
+    std::uint64_t records;     // that passes work on; 0 if not all fit
+    std::uint64_t triangles_in;
+    std::uint64_t counts_voxels; // 0 or 1
+};
+
+struct note_cells {
+    std::uint64_t triangles_in;
+    bool counts_voxels;
+    cell_state* state;
+    VOXELPIPE_HD void operator()(std::uint64_t) const {
+        state->triangles_in = triangles_in;
+        state->counts_voxels = counts_voxels ? 1 : 0;
+    }
+};
+// Whether the records fit.
+struct bound_cell_records {
+    const unsigned long long* total;
+    std::uint64_t room;
+    cell_state* state;
+    VOXELPIPE_HD void operator()(std::uint64_t) const {
+        if (state->counts[core::index_of(core::cell_count::bad_index)] != 0) state->call.index_error |= bad_index;
+        if (*total > room) state->call.index_error |= stopped;
+        state->all_records = *total;
+        state->records = state->call.index_error == 0 ? *total : 0;
+    }
+};
+struct stop_large_windings {
+    cell_state* state;
+    VOXELPIPE_HD void operator()(std::uint64_t) const {
+        if (state->counts[core::index_of(core::cell_count::too_large)] != 0) state->call.index_error |= stopped;
+    }
+};
+// Keys behind the records stand for no voxel, and are sorted to the end.
+struct fill_cell_keys {
+    const std::uint64_t* records;
+    std::uint64_t none;
+    std::uint64_t* keys;
+    std::uint32_t* order;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (i < *records) return;
+        keys[i] = none;
+        order[i] = 0;
+    }
+};
+template <class F>
+struct unless_stopped {
+    F f;
+    const unsigned int* error;
+    VOXELPIPE_ANY_CALLABLE
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (*error == 0) f(i);
+    }
+};
+
+// The memory of a call, in the order of its arrays, and its launches.
+template <class Draw, class... Targets>
+class async_cells {
+    using cell_shader = std::remove_cvref_t<decltype(std::declval<Draw>().fragment_shader)>;
+    using vertex_shader = std::remove_cvref_t<decltype(std::declval<Draw>().vertex_shader)>;
+    using mesh_type = std::remove_cvref_t<decltype(std::declval<Draw>().mesh)>;
+    using walk_type = core::passes::cell_walk<cell_shader>;
+    using terms_type = typename walk_type::terms_type;
+    using cursor = typename walk_type::cursor;
+
+public:
+    // fits(): false if vertices, edges, rows or records cannot be numbered; then there is no memory.
+    async_cells(std::span<const Draw> draws, const grid& g, const cell_options& options, std::uint64_t room,
+                arena& memory)
+        : draws_(draws), grid_(g), options_(options), room_(room), extent_(core::turn(g.extent, options.axis)) {
+        for (const Draw& d : draws) {
+            begins_.push_back({vertices_, triangles_});
+            vertices_ += d.mesh.positions.size() * d.mesh.copies.count;
+            triangles_ += d.mesh.triangles.size() * d.mesh.copies.count;
+        }
+        const auto wide = [](int n) { return static_cast<std::uint64_t>(n); };
+        rows_ = wide(extent_.y) * wide(extent_.z);
+        keys_of_ = {wide(extent_.x) + 2, wide(extent_.y),
+                    options.bodies == bodies::call ? 1 : std::uint64_t{draws.size()}};
+        num_keys_ = static_cast<uint128>(rows_) * keys_of_.bodies * keys_of_.slots;
+        if (!fits()) return;
+        const std::uint64_t sorted = std::max(room, num_edges());
+        state_ = memory.take<cell_state>(1);
+        positions_ = memory.take<core::snapped_position>(vertices_ + 1);
+        indices_ = memory.take<glm::uvec3>(triangles_);
+        first_triangle_ = memory.take<std::uint64_t>(draws.size());
+        shaders_ = memory.take<cell_shader>(draws.size());
+        num_terms_ = memory.take<std::uint32_t>(triangles_ + 1);
+        first_term_ = memory.take<unsigned long long>(triangles_ + 1);
+        scan_bytes_ = cell_scan_bytes(static_cast<std::uint32_t>(triangles_ + 1));
+        scan_ = memory.take<std::uint8_t>(scan_bytes_);
+        for (int i = 0; i < 2; ++i) {
+            keys_[i] = memory.take<std::uint64_t>(sorted);
+            order_[i] = memory.take<std::uint32_t>(sorted);
+        }
+        sort_bytes_ =
+            std::max(sort_bytes_of(room, key_bits()), sort_bytes_of(num_edges(), core::passes::edge_key_bits));
+        sort_ = memory.take<std::uint8_t>(sort_bytes_);
+        terms_ = memory.take<terms_type>(room);
+        cursors_ = keys_of_.bodies == 1 ? nullptr : memory.take<cursor>(rows_ * keys_of_.bodies);
+    }
+    [[nodiscard]] bool fits() const {
+        return vertices_ < core::max_numbered && triangles_ < core::max_numbered && num_edges() < core::max_numbered &&
+               room_ < core::max_numbered && num_keys_ >> 63 == 0;
+    }
+
+    void launch(const framebuffer_view<Targets...>& fb, cudaStream_t stream) const {
+        using namespace core::passes;
+        std::uint64_t* const counts = state_->counts;
+        const unsigned int* const error = &state_->call.index_error;
+        check(cudaMemsetAsync(state_, 0, sizeof(cell_state), stream));
+        check_subsets(draws_, &state_->call.index_error, stream);
+        run(1, note_cells{triangles_, options_.count_voxels, state_}, stream);
+        upload(
+            first_triangle_, draws_.size(), [&](std::size_t d) { return begins_[d].triangle; }, stream);
+        upload(
+            shaders_, draws_.size(), [&](std::size_t d) { return draws_[d].fragment_shader; }, stream);
+        for (std::size_t d = 0; d < draws_.size(); ++d) {
+            const auto& mesh = draws_[d].mesh;
+            const snap_vertices_of_cells<mesh_type, vertex_shader> snap{mesh,
+                                                                        draws_[d].vertex_shader,
+                                                                        static_cast<std::uint32_t>(d),
+                                                                        core::make_snap_transform(grid_),
+                                                                        options_.axis,
+                                                                        positions_ + begins_[d].vertex};
+            run(mesh.positions.size() * mesh.copies.count, unless_stopped<decltype(snap)>{snap, error}, stream);
+            const join_triangles join{core::elements_of<mesh_type>::indices(mesh),
+                                      static_cast<std::uint32_t>(begins_[d].vertex), indices_ + begins_[d].triangle,
+                                      counts};
+            run(mesh.triangles.size() * mesh.copies.count, join, stream);
+        }
+        const cell_mesh mesh = joined();
+        run(triangles_ + 1, core::passes::count_cells<terms_type>{mesh, num_terms_, counts}, stream);
+        sum_counts(num_terms_, first_term_, static_cast<std::uint32_t>(triangles_ + 1), scan_, scan_bytes_,
+                   stage::coarse_raster, stream);
+        run(1, bound_cell_records{first_term_ + triangles_, room_, state_}, stream);
+        if (options_.count_open_edges) {
+            run(num_edges(), hash_edges{mesh, keys_[0], order_[0]}, stream);
+            const int at = sort(num_edges(), edge_key_bits, stream);
+            run(num_edges(), count_open_edges{mesh, keys_[at], order_[at], num_edges(), counts}, stream);
+        }
+        run(room_, fill_cell_keys{&state_->records, static_cast<std::uint64_t>(num_keys_), keys_[0], order_[0]},
+            stream);
+        const core::passes::list_cells<terms_type> list{
+            mesh, keys_of_, reinterpret_cast<const std::uint64_t*>(first_term_), keys_[0], order_[0], terms_};
+        run(triangles_, unless_stopped<core::passes::list_cells<terms_type>>{list, error}, stream);
+        const int at = sort(room_, key_bits(), stream);
+        const record_list<terms_type> records{keys_of_, keys_[at], order_[at], terms_, room_};
+        constexpr std::uint64_t safe = std::uint64_t{1} << 19; // triangles whose covers cannot wrap
+        run(rows_ * keys_of_.bodies, measure_rows<terms_type>{records, triangles_ >= safe, counts}, stream);
+        run(1, stop_large_windings{state_}, stream);
+        clear_framebuffer(fb, &state_->call, stream);
+        const walk_type walk{records, mesh, shaders_, cursors_, grid_.offset, options_.axis, extent_.x};
+        using shade = shade_cells<cell_shader, Targets...>;
+        run(rows_, unless_stopped<shade>{shade{walk, fb, counts}, error}, stream);
+    }
+
+private:
+    struct begin {
+        std::uint64_t vertex, triangle;
+    };
+    [[nodiscard]] std::uint64_t num_edges() const { return options_.count_open_edges ? 3 * triangles_ : 0; }
+    [[nodiscard]] int key_bits() const {
+        return static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys_)));
+    }
+    [[nodiscard]] static std::size_t sort_bytes_of(std::uint64_t count, int bits) {
+        return count < 2 ? 0 : sort_bytes<std::uint64_t>(count, bits);
+    }
+    // Returns which of the two pairs of arrays holds the result.
+    [[nodiscard]] int sort(std::uint64_t count, int bits, cudaStream_t stream) const {
+        return count < 2 ? 0
+                         : sort_by_cell<std::uint64_t>(keys_, order_, count, bits, sort_, sort_bytes_, stage::tile_sort,
+                                                       stream);
+    }
+    [[nodiscard]] core::passes::cell_mesh joined() const {
+        return {positions_,
+                indices_,
+                first_triangle_,
+                static_cast<std::uint32_t>(draws_.size()),
+                static_cast<std::uint32_t>(draws_.size()),
+                static_cast<std::uint32_t>(triangles_),
+                static_cast<std::uint32_t>(triangles_),
+                grid_.fraction(),
+                extent_,
+                core::areas_of(grid_, options_.axis)};
+    }
+    template <class F>
+    static void run(std::uint64_t count, const F& f, cudaStream_t stream) {
+        for_each(count, f, stage::coarse_raster, stream);
+    }
+
+    std::span<const Draw> draws_;
+    const grid& grid_;
+    const cell_options& options_;
+    std::uint64_t room_, vertices_ = 0, triangles_ = 0, rows_ = 0;
+    glm::ivec3 extent_; // turned
+    std::vector<begin> begins_;
+    core::passes::cell_keys keys_of_{};
+    uint128 num_keys_ = 0;
+    cell_state* state_ = nullptr;
+    core::snapped_position* positions_ = nullptr;
+    glm::uvec3* indices_ = nullptr;
+    std::uint64_t* first_triangle_ = nullptr;
+    cell_shader* shaders_ = nullptr;
+    std::uint32_t* num_terms_ = nullptr;
+    unsigned long long* first_term_ = nullptr;
+    std::uint8_t *scan_ = nullptr, *sort_ = nullptr;
+    std::size_t scan_bytes_ = 0, sort_bytes_ = 0;
+    std::uint64_t* keys_[2] = {nullptr, nullptr};
+    std::uint32_t* order_[2] = {nullptr, nullptr};
+    terms_type* terms_ = nullptr;
+    cursor* cursors_ = nullptr;
+};
+
+[[nodiscard]] inline status validate_async(const cell_options& options, const grid& g) {
+    if (const status s = validate(g); !s.ok()) return s;
+    if (const status s = core::validate(options); !s.ok()) return s;
+    return options.repair == repair::none ? status{} : core::failure(status_code::strategy_unavailable);
+}
+
+} // namespace device
+
+// Bytes that voxelize_cells_async needs for such a call on the current device; 0 if the arguments are invalid, or the
+// call closes holes, which takes waits.
+template <class Mesh, class VertexShader, class CellShader, class... Targets>
+[[nodiscard]] std::size_t cell_workspace_bytes(std::span<const draw<Mesh, VertexShader, CellShader>> draws,
+                                               const grid& g, const framebuffer_view<Targets...>&,
+                                               const cell_options& options, const cell_limits& limits) {
+    const status s = core::validate_draws(draws);
+    if (!s.ok() || !device::validate_async(options, g).ok()) return 0;
+    if (s.counts.triangles_in == 0) return sizeof(device::cell_state);
+    return device::bytes_or_none([&]() -> std::size_t {
+        device::arena plan;
+        const device::async_cells<draw<Mesh, VertexShader, CellShader>, Targets...> call(draws, g, options,
+                                                                                         limits.records, plan);
+        return call.fits() ? plan.used() : 0;
+    });
+}
+
+// Puts the call on the backend's stream and returns. A status other than ok means that nothing was launched, or that a
+// launch failed; read_cells_status reports what the device finds out. strategy_unavailable: the call closes holes.
+template <class Mesh, class VertexShader, class CellShader, class... Targets>
+[[nodiscard]] status voxelize_cells_async(cuda_backend& backend,
+                                          std::span<const draw<Mesh, VertexShader, CellShader>> draws, const grid& g,
+                                          const framebuffer_view<Targets...>& fb, const cell_options& options,
+                                          const cell_workspace_view& workspace) {
+    if constexpr (core::cell_fits_targets<Mesh, VertexShader, CellShader, Targets...>()) {
+        if (const status s = device::validate_async(options, g); !s.ok()) return s;
+        if (const status s = core::validate_framebuffer(fb, g); !s.ok()) return s;
+        const status s = core::validate_draws(draws);
+        if (!s.ok()) return s;
+        return device::with_cuda_status([&]() -> status {
+            const std::size_t need = cell_workspace_bytes(draws, g, fb, options, workspace.limits);
+            if (need == 0) return core::failure(status_code::size_overflow);
+            if (workspace.memory == nullptr || workspace.bytes < need) {
+                status small = core::failure(status_code::capacity_exceeded);
+                small.required.bytes = need;
+                return small;
+            }
+            if (s.counts.triangles_in == 0) {
+                auto* const state = static_cast<device::cell_state*>(workspace.memory);
+                device::launch_until(stage::fine_raster, [&] {
+                    device::check(cudaMemsetAsync(state, 0, sizeof(device::cell_state), backend.stream));
+                    device::clear_framebuffer(fb, &state->call, backend.stream);
+                });
+                return {};
+            }
+            device::arena memory(workspace.memory);
+            const device::async_cells<draw<Mesh, VertexShader, CellShader>, Targets...> call(
+                draws, g, options, workspace.limits.records, memory);
+            device::launch_until(stage::coarse_raster, [&] { call.launch(fb, backend.stream); });
+            return {};
+        });
+    } else {
+        return {}; // does not compile: a static_assert has said why
+    }
+}
+
+// Waits for the stream and returns the status of the last call in this workspace, that of voxelize_cells. `need` may be
+// null. Where the records did not fit (capacity_exceeded), *need receives limits that suffice for the same call.
+[[nodiscard]] inline status read_cells_status(cuda_backend& backend, const cell_workspace_view& workspace,
+                                              cell_limits* need = nullptr) {
+    device::cell_state state{};
+    if (const status s = device::read_start(workspace.memory, state, backend.stream); !s.ok()) return s;
+    if ((state.call.index_error & device::bad_numbers) != 0) return core::failure(status_code::bad_subset);
+    cell_options options;
+    options.count_voxels = state.counts_voxels != 0;
+    const std::vector<std::uint64_t> counts(std::begin(state.counts), std::end(state.counts));
+    const status s = core::make_cell_status(counts, options, state.triangles_in, state.all_records);
+    if (!s.ok() || (state.call.index_error & device::stopped) == 0) return s;
+    if (need != nullptr) need->records = std::max(workspace.limits.records, state.all_records);
+    status failed = core::failure(status_code::capacity_exceeded, stage::coarse_raster);
+    failed.counts.triangles_in = state.triangles_in;
+    return failed;
+}
+
+} // namespace voxelpipe
