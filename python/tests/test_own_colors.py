@@ -95,8 +95,10 @@ def test_values_without_colours():
             vp.bake(mesh, grid)
     with pytest.raises(ValueError, match="'color'.*not 'rgb'"):
         vp.bake((v, f), grid, "rgb")
-    with pytest.raises(ValueError, match="blend, per and fill"):
+    with pytest.raises(ValueError, match="without arrays of values"):
         vp.bake((v, f), grid, "normal", blend="max")
+    with pytest.raises(ValueError, match=r"per=\{'typo': 'corner'\} without arrays of values"):
+        vp.bake((v, f), grid, per={"typo": "corner"})
     with pytest.raises(TypeError, match="values is a mapping"):
         vp.bake((v, f), grid, 5)
 

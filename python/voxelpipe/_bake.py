@@ -179,8 +179,14 @@ def _to_caller(mesh: Any) -> Any:
 
 
 def _check_own(blend: Any, per: Any, fill: Any = 0) -> None:
-    if blend is not None or per is not None or fill != 0:
-        raise ValueError("blend, per and fill go with arrays of values; a mesh's own are blended as the voxelize tool does")
+    given = [] if blend is None else [f"blend={blend!r}"]
+    given += [] if per is None else [f"per={per!r}"]
+    given += [] if fill == 0 else [f"fill={fill!r}"]
+    if given:
+        raise ValueError(
+            f"{' and '.join(given)} without arrays of values, such as values={{'rgb': colors}}: a mesh's own values are blended "
+            "as the voxelize tool does"
+        )
 
 
 def _is_own(values: Any) -> bool:
