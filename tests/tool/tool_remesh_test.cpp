@@ -384,6 +384,23 @@ TEST(Remeshing, EmbeddedMeshesDoNotIntersectThemselves) {
     EXPECT_LE(moved, counts["moved_vertices"].get<std::uint64_t>());
 }
 
+// Bits of this grid alone are 3.1 GiB: samples lie in bricks, and what is needed follows the model.
+TEST(Remeshing, LargeGridsTakeMemoryByTheSurface) {
+    const scratch_folder folder;
+    surface_tests::host_mesh model = surface_tests::octahedron(glm::vec3(0.0F), 0.01F);
+    model.add(surface_tests::octahedron(glm::vec3(1.0F), 0.01F));
+    write_obj(folder / "m.obj", model);
+    const outcome result = run(folder, {folder / "m.obj", "--remesh", "-r", "3000", "--max-memory", "300", "--stats",
+                                        "json", "-o", folder / "o.ply"});
+    ASSERT_EQ(0, result.code) << result.err;
+    EXPECT_EQ(2, json::parse(result.out)["remesh"]["components"]);
+    EXPECT_TRUE(read_surface_ply(folder / "o.ply").is_closed());
+    const outcome refused = run(folder, {folder / "m.obj", "--remesh", "-r", "3000", "--max-memory", "300", "--iso",
+                                         "0.2", "-o", folder / "o.ply"});
+    EXPECT_NE(0, refused.code);
+    EXPECT_NE(std::string::npos, refused.err.find("MiB are needed")) << refused.err;
+}
+
 TEST(Remeshing, LevelsGrowTheModel) {
     const scratch_folder folder;
     write_crossing_boxes(folder / "m.glb");

@@ -49,7 +49,7 @@ template <class Backend, class... Bits, class... Values>
     });
 }
 
-// Of a field in a band, as voxelize_distance makes it of a sparse framebuffer: floats of the first target of `from`,
+// Takes a field in a band, as voxelize_distance makes it of a sparse framebuffer: floats of the first target of `from`,
 // whose clear value is the band's distance (core::band_distance). Where it has no sample, the first target of `inside`
 // says which are, bits of the same grid, as voxelize_solid makes them by the same rule and repair: these are minus the
 // band's distance, and the others plus that. The arrays are those of the dense field of a band that reaches two voxels

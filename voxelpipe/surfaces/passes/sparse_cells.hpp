@@ -107,7 +107,7 @@ class sparse_samples {
     using buffer = typename Backend::template buffer<T>;
 
 public:
-    // Of bits alone.
+    // Reads bits alone.
     template <class Bits>
     sparse_samples(Backend& backend, const Bits& bits)
         : bit_slots_(backend, bits), bit_layers_(backend, bits.num_bricks()), field_layers_(backend, 0) {
