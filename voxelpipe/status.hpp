@@ -110,7 +110,7 @@ struct solid_counters {
     std::uint64_t open_rows = 0;
     std::uint64_t crossings = 0;   // of triangles with rows, in, before and behind the grid
     std::uint64_t max_winding = 0; // greatest |winding number| of a voxel's centre; 0 for fill_rule::even_odd
-    // repair::close_holes only:
+    // repair::close_holes and repair::winding only:
     std::uint64_t hole_edges = 0; // edges that no opposite edge cancels
     std::uint64_t holes = 0;      // their connected components
     std::uint64_t cones = 0;      // holes that were closed
@@ -124,7 +124,6 @@ struct solid_counters {
 struct distance_counters {
     std::uint64_t band_samples = 0; // samples that hold their distance; the others hold the band's
     std::uint64_t bad_points = 0;   // distance_at: points that are not finite or beyond 2^40 sub-voxel units
-    std::uint64_t winding_sums = 0; // repair::winding: samples whose solid angles were summed
     friend bool operator==(const distance_counters&, const distance_counters&) = default;
 };
 

@@ -98,7 +98,7 @@ template <class Mesh, class VertexShader, class Shader>
         if (options.sign == distance_sign::inside && triangles_in != 0) {
             const solid_options solid = sign_options(options);
             bodies.emplace(cpu::make_solid_geometry(how, draws, g, glm::ivec3(0), solid));
-            if (options.repair == repair::close_holes && !cpu::add_cones(*bodies, solid, result.solid))
+            if (has_cones(options.repair) && !cpu::add_cones(*bodies, solid, result.solid))
                 return cpu::solid_failure(status_code::too_many_triangles, *bodies);
             body_tree = std::make_unique<cpu::triangle_tree>(how, *bodies, cpu::reach_of(options, g),
                                                              triple<std::int64_t>{}, scale);

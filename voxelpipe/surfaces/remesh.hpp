@@ -139,7 +139,7 @@ remesh_exactly(Backend& backend, std::span<const draw<Mesh, VertexShader, consta
         out.samples = samples;
         return result;
     }
-    if (options.repair == repair::close_holes)
+    if (has_cones(options.repair))
         cones = run_module(find_holes_tag{}, backend, draws, samples, options.bodies, options.max_hole_edges);
     typename Backend::template buffer<edge_crossing> crossings(backend, cells.num_edges());
     typename Backend::template buffer<std::uint64_t> counts(backend,
