@@ -54,7 +54,9 @@ TEST(DeviceDistance, SignsOfEveryRuleAndRepair) {
          {vp::distance_options{}, vp::distance_options{.rule = vp::fill_rule::positive},
           vp::distance_options{.bodies = vp::bodies::draw, .repair = vp::repair::close_holes},
           vp::distance_options{.repair = vp::repair::exterior, .closing = 1},
-          vp::distance_options{.repair = vp::repair::vote}})
+          vp::distance_options{.repair = vp::repair::vote}, vp::distance_options{.repair = vp::repair::winding},
+          vp::distance_options{
+              .rule = vp::fill_rule::positive, .bodies = vp::bodies::draw, .repair = vp::repair::winding}})
         expect_same<two_targets>(meshes, unit_grid(extent), nearest_shader{}, o);
 }
 

@@ -327,6 +327,7 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
     for (const std::string rule : {"even_odd", "positive", "each_draw", "exterior"})
         refused({"-t", "fraction", "--solid", rule}, "--solid " + rule + " and --target fraction do not go together");
     refused({"-t", "fraction", "--solid", "nonzero", "--vote"}, "--vote and --target fraction");
+    refused({"-t", "fraction", "--solid", "nonzero", "--winding"}, "--winding and --target fraction");
     refused({"-t", "fraction", "--solid", "nonzero", "--close-holes"}, "--close-holes and --target fraction");
     refused({"-t", "fraction", "--coverage", "thin"}, "--coverage and --target fraction");
     refused({"-t", "fraction", "--alpha", "cutoff"}, "--alpha cutoff and --target fraction");

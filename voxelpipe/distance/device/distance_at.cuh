@@ -36,6 +36,7 @@ struct point_call {
     fill_rule rule;
     bool has_sign;
     std::uint32_t num_draws, num_bodies;
+    const core::winding_view* trees; // of each body's cones, for repair::winding; else null
 };
 
 inline constexpr unsigned warps_of_points = 4;
@@ -119,7 +120,8 @@ __global__ __launch_bounds__(32 * warps_of_points) void find_points(const __grid
                         __syncwarp();
                         winding += __reduce_add_sync(0xffffffffu, own);
                     });
-                is_inside = call.rule == fill_rule::even_odd   ? winding % 2 != 0
+                is_inside = call.trees != nullptr ? core::is_inside_by_winding(call.trees[body], p, winding, call.rule)
+                            : call.rule == fill_rule::even_odd ? winding % 2 != 0
                             : call.rule == fill_rule::positive ? winding > 0
                                                                : winding != 0;
             }
@@ -202,7 +204,8 @@ template <class Mesh, class VertexShader, class Shader>
                                                           options.rule,
                                                           has_sign,
                                                           static_cast<std::uint32_t>(draws.size()),
-                                                          is_split ? static_cast<std::uint32_t>(draws.size()) : 1u};
+                                                          is_split ? static_cast<std::uint32_t>(draws.size()) : 1u,
+                                                          cones.trees.empty() ? nullptr : cones.trees[0].data()};
                             const glm::dvec3 size = g.voxel_size;
                             if (points.size() != 0) {
                                 device::find_points<typename draws_type::shading_type>

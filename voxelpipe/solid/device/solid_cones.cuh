@@ -40,6 +40,7 @@ struct solid_cones {
     std::vector<device_buffer<glm::uvec3>> triangles;
     std::vector<device_buffer<core::winding_node>> nodes;
     std::vector<device_buffer<core::snapped_position>> corners;
+    std::vector<device_buffer<core::winding_view>> trees; // repair::winding: one array, of the parts' trees
 };
 
 template <class T>
@@ -128,6 +129,11 @@ template <class Mesh, class VertexShader, class SolidShader>
         }
         made.parts.push_back(part);
         made.num_triangles += cones.triangles.size();
+    }
+    if (options.repair == repair::winding) {
+        std::vector<core::winding_view> trees;
+        for (const cone_part& part : made.parts) trees.push_back(part.tree);
+        made.trees.emplace_back(from, array_view<const core::winding_view>(trees.data(), trees.size()));
     }
     return made;
 }
