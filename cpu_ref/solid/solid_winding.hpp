@@ -42,7 +42,8 @@ namespace voxelpipe::cpu {
     const core::distance_scale scale = core::make_distance_scale(s.where.voxel_size, s.snap.fraction);
     std::vector<core::winding_tree> trees;
     trees.reserve(s.cones.size());
-    for (const core::hole_cones& cones : s.cones) trees.emplace_back(cones, scale);
+    for (const core::hole_cones& cones : s.cones)
+        trees.emplace_back(cones, scale, core::largest_side(s.where.voxel_size));
     return trees;
 }
 
@@ -81,9 +82,22 @@ public:
         }
         if (tree.num_triangles == 0) return;
         for (int x = s_.lead.x / 32 * 32; x < s_.where.extent.x; x += 32) {
-            if (is_decided(tree, {x, y0, z0}, 32)) continue;
-            for (int brick = x; brick < std::min(x + 32, s_.where.extent.x); brick += side)
-                if (!is_decided(tree, {brick, y0, z0}, side)) decide(tree, {brick, y0, z0});
+            std::int64_t whole = 0;
+            const bool is_decided = find_whole(tree, {x, y0, z0}, 32, whole);
+            if (is_decided && whole == 0) continue; // the bits are those of the winding numbers
+            for (int brick = x; brick < std::min(x + 32, s_.where.extent.x); brick += side) {
+                const glm::ivec3 at(brick, y0, z0);
+                if (is_decided || find_whole(tree, at, side, whole)) {
+                    if (whole != 0)
+                        decide(at, [&](const core::snapped_position&, std::int32_t k) {
+                            return core::is_inside_beyond(rule_, k, whole);
+                        });
+                } else {
+                    decide(at, [&](const core::snapped_position& p, std::int32_t k) {
+                        return core::is_inside_by_winding(tree, p, k, rule_);
+                    });
+                }
+            }
         }
     }
     [[nodiscard]] std::uint32_t word(int r, std::size_t i) const {
@@ -95,7 +109,8 @@ private:
         const auto at = [&](int i) { return (2 * std::int64_t{i} + 1) << (s_.snap.fraction - 1); };
         return {at(x), at(y), at(z)};
     }
-    [[nodiscard]] bool is_decided(const core::winding_view& tree, const glm::ivec3& first, int length) const {
+    [[nodiscard]] bool find_whole(const core::winding_view& tree, const glm::ivec3& first, int length,
+                                  std::int64_t& whole) const {
         const glm::dvec3 size = s_.where.voxel_size;
         const double x = 0.5 * (length - 1), yz = 0.5 * (side - 1);
         const double reach = std::hypot(x * size.x, yz * size.y, yz * size.z);
@@ -103,9 +118,11 @@ private:
         centre.x[0] += x * size.x;
         centre.x[1] += yz * size.y;
         centre.x[2] += yz * size.z;
-        return core::is_decided_by_crossings(tree, centre, reach * (1.0 + 0x1p-20));
+        return core::find_whole(tree, centre, reach * (1.0 + 0x1p-20), core::coarse_bound, whole);
     }
-    void decide(const core::winding_view& tree, const glm::ivec3& first) {
+    // verdict(sample, winding number): of the voxels of a brick.
+    template <class Verdict>
+    void decide(const glm::ivec3& first, const Verdict& verdict) {
         const glm::ivec3 end = glm::min(first + side, s_.where.extent);
         for (int z = std::max(first.z, s_.lead.z); z < end.z; ++z)
             for (int y = std::max(first.y, s_.lead.y); y < end.y; ++y)
@@ -114,9 +131,7 @@ private:
                     const auto i = static_cast<std::size_t>(x);
                     std::uint32_t& word = bits_[r * words_ + i / 32];
                     const std::uint32_t bit = 1u << i % 32;
-                    word = core::is_inside_by_winding(tree, sample(x, y, z), windings_[r * stride_ + i], rule_)
-                               ? word | bit
-                               : word & ~bit;
+                    word = verdict(sample(x, y, z), windings_[r * stride_ + i]) ? word | bit : word & ~bit;
                 }
     }
 

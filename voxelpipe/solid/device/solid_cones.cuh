@@ -39,6 +39,7 @@ struct solid_cones {
     std::vector<device_buffer<int32_position>> near;
     std::vector<device_buffer<glm::uvec3>> triangles;
     std::vector<device_buffer<core::winding_node>> nodes;
+    std::vector<device_buffer<core::winding_piece>> pieces;
     std::vector<device_buffer<core::snapped_position>> corners;
     std::vector<device_buffer<core::winding_view>> trees; // repair::winding: one array, of the parts' trees
 };
@@ -120,12 +121,15 @@ template <class Mesh, class VertexShader, class SolidShader>
                          num_vertices};
         if (options.repair == repair::winding) {
             const core::winding_tree tree(
-                cones, core::make_distance_scale(g.voxel_size, core::make_snap_transform(g).fraction));
+                cones, core::make_distance_scale(g.voxel_size, core::make_snap_transform(g).fraction),
+                core::largest_side(g.voxel_size));
             auto& nodes = made.nodes.emplace_back(
                 from, array_view<const core::winding_node>(tree.nodes().data(), tree.nodes().size()));
+            auto& pieces = made.pieces.emplace_back(
+                from, array_view<const core::winding_piece>(tree.pieces().data(), tree.pieces().size()));
             auto& corners =
                 made.corners.emplace_back(from, positions_view(tree.corners().data(), tree.corners().size()));
-            part.tree = tree.view(nodes.data(), corners.data());
+            part.tree = tree.view(nodes.data(), pieces.data(), corners.data());
         }
         made.parts.push_back(part);
         made.num_triangles += cones.triangles.size();

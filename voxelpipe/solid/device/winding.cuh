@@ -91,7 +91,9 @@ __global__ __launch_bounds__(threads_per_block) void decide_bricks_kernel(
                   z0 = static_cast<int>(brick / (bx * by)) * winding_brick;
         core::world_point middle = core::to_world(tree, {at(x0), at(y0), at(z0)});
         for (int k = 0; k < 3; ++k) middle.x[k] += corner.x[k];
-        if (core::is_decided_by_crossings(tree, middle, reach)) continue; // for all lanes alike
+        std::int64_t whole = 0; // for all lanes alike
+        const bool is_decided = core::find_whole(tree, middle, reach, core::coarse_bound, whole);
+        if (is_decided && whole == 0) continue; // the bits are those of the winding numbers
         for (int step = 0; step < 2 * winding_brick; ++step) {
             const int x = x0 + lane % 8, y = y0 + lane / 8 + 4 * (step % 2), z = z0 + step / 2;
             const bool exists = x < grid.extent.x && y < grid.extent.y && z < grid.extent.z;
@@ -99,7 +101,8 @@ __global__ __launch_bounds__(threads_per_block) void decide_bricks_kernel(
             if (exists) {
                 const std::uint64_t place =
                     grid.row(y, z) * (static_cast<std::uint64_t>(grid.extent.x) + 1) + static_cast<std::uint64_t>(x);
-                is_in = core::is_inside_by_winding(tree, {at(x), at(y), at(z)}, windings[place], rule);
+                is_in = is_decided ? core::is_inside_beyond(rule, windings[place], whole)
+                                   : core::is_inside_by_winding(tree, {at(x), at(y), at(z)}, windings[place], rule);
             }
             const word bits = __ballot_sync(0xffffffffu, static_cast<int>(is_in));
             if (exists && lane % 8 == 0)
