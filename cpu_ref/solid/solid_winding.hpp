@@ -58,7 +58,7 @@ public:
 
     // Finds the bits of the rows from (y0, z0) on. [first, last): the crossings of their beam.
     template <class Crossing>
-    void find(const row_numbers& rows, int y0, int z0, std::uint32_t body, const core::winding_view& tree,
+    void find(const row_numbers& rows, int y0, int z0, std::uint32_t body, const core::winding_tree& cones,
               const Crossing* first, const Crossing* last, solid_counters& counts) {
         std::fill(windings_.begin(), windings_.end(), 0);
         std::fill(bits_.begin(), bits_.end(), 0u);
@@ -80,6 +80,7 @@ public:
                 if (core::is_inside(rule_, w[x])) bits[x / 32] |= 1u << x % 32;
             }
         }
+        const core::winding_view tree = cones.view();
         if (tree.num_triangles == 0) return;
         for (int x = s_.lead.x / 32 * 32; x < s_.where.extent.x; x += 32) {
             std::int64_t whole = 0;
@@ -89,13 +90,11 @@ public:
                 const glm::ivec3 at(brick, y0, z0);
                 if (is_decided || find_whole(tree, at, side, whole)) {
                     if (whole != 0)
-                        decide(at, [&](const core::snapped_position&, std::int32_t k) {
+                        decide(at, [&](const glm::ivec3&, std::int32_t k) {
                             return core::is_inside_beyond(rule_, k, whole);
                         });
                 } else {
-                    decide(at, [&](const core::snapped_position& p, std::int32_t k) {
-                        return core::is_inside_by_winding(tree, p, k, rule_);
-                    });
+                    decide_by_sums(cones, at);
                 }
             }
         }
@@ -120,7 +119,23 @@ private:
         centre.x[2] += yz * size.z;
         return core::find_whole(tree, centre, reach * (1.0 + 0x1p-20), core::coarse_bound, whole);
     }
-    // verdict(sample, winding number): of the voxels of a brick.
+    // Once several samples of a brick have taken the whole sum, it is a linear function for the others.
+    void decide_by_sums(const core::winding_tree& cones, const glm::ivec3& first) {
+        const core::winding_view tree = cones.view();
+        core::winding_tree::linear near;
+        constexpr int most_sums = 4;
+        int sums = 0;
+        decide(first, [&](const glm::ivec3& at, std::int32_t k) {
+            const glm::ivec3 p = at - first;
+            bool was_summed = false;
+            const bool is_in = core::is_inside_by_winding(tree, sample(at.x, at.y, at.z), k, rule_,
+                                                          near.at(p.x, p.y, p.z), was_summed);
+            if (was_summed && ++sums == most_sums)
+                near = cones.find_linear(sample(first.x, first.y, first.z), std::int64_t{1} << s_.snap.fraction);
+            return is_in;
+        });
+    }
+    // verdict(voxel, winding number): of the voxels of a brick.
     template <class Verdict>
     void decide(const glm::ivec3& first, const Verdict& verdict) {
         const glm::ivec3 end = glm::min(first + side, s_.where.extent);
@@ -131,7 +146,7 @@ private:
                     const auto i = static_cast<std::size_t>(x);
                     std::uint32_t& word = bits_[r * words_ + i / 32];
                     const std::uint32_t bit = 1u << i % 32;
-                    word = verdict(sample(x, y, z), windings_[r * stride_ + i]) ? word | bit : word & ~bit;
+                    word = verdict(glm::ivec3(x, y, z), windings_[r * stride_ + i]) ? word | bit : word & ~bit;
                 }
     }
 
@@ -166,7 +181,7 @@ template <class Crossing>
         for (int z = z0; z < std::min(z0 + tile_size, s.where.extent.z); z += side)
             for (int y = y0; y < std::min(y0 + tile_size, s.where.extent.y); y += side)
                 for (std::uint32_t body = 0; body < trees.size(); ++body) {
-                    found.find(rows, y, z, body, trees[body].view(), first, last, of_beam[b]);
+                    found.find(rows, y, z, body, trees[body], first, last, of_beam[b]);
                     for (int r = 0; r < side * side; ++r)
                         for (std::size_t i = 0; i < rows.words(); ++i) {
                             const std::uint32_t bits = found.word(r, i);

@@ -436,5 +436,48 @@ TEST(Winding, ATreeOfManyConesGivesTheVerdictsOfTheWholeSum) {
     EXPECT_LT(kept, decided);
 }
 
+// Away from the rims of holes S is nearly linear in a brick, but for whole steps at the cones.
+TEST(Winding, TheLinearFunctionOfABrickHoldsAllItsSamples) {
+    const vp::grid g = unit_grid(glm::ivec3(64));
+    const mesh m = below(sphere(glm::vec3(32.0f), 29.0f, 4), 34.0f);
+    std::vector<core::snapped_position> positions;
+    std::vector<glm::uvec3> corners;
+    for (const auto& t : snap(m, g)) {
+        const auto first = static_cast<std::uint32_t>(positions.size());
+        for (const auto& v : t.v) positions.push_back({v[0], v[1], v[2]});
+        corners.push_back({first, first + 1, first + 2});
+    }
+    const auto n = static_cast<std::uint32_t>(corners.size());
+    const core::hole_cones cones =
+        core::close_holes({{positions.data(), positions.size(), {corners.data(), n, 3 * n}, n}}, ~std::uint64_t{0});
+    const core::winding_tree tree(cones, core::make_distance_scale(g.voxel_size, g.fraction()), 1.0);
+    const core::winding_view view = tree.view();
+    const int bits = core::angle_bits(view.num_triangles);
+    const std::int64_t step = std::int64_t{1} << g.fraction();
+    splitmix64 random(16);
+    int known = 0;
+    for (int i = 0; i < 60; ++i) {
+        const auto any = [&] { return 8 * random.between(1, 6) * step + step / 2; };
+        const core::snapped_position first{any(), any(), (i % 2 == 0 ? 32 : 24) * step + step / 2};
+        const auto linear = tree.find_linear(first, step);
+        for (int s = 0; s < 24; ++s) {
+            const auto x = static_cast<int>(random.below(8)), y = static_cast<int>(random.below(8)),
+                       z = static_cast<int>(random.below(8));
+            const core::winding_hint hint = linear.at(x, y, z);
+            if (hint.off >= 0.5) continue;
+            ++known;
+            const core::snapped_position p{first.x + x * step, first.y + y * step, first.z + z * step};
+            bool is_on = false, was_summed = false;
+            const std::int64_t sum = core::sum_angles(view, p, bits, 0, view.num_triangles, is_on);
+            const double off = std::ldexp(static_cast<double>(sum), -bits) - hint.turns;
+            if (!is_on) ASSERT_LE(std::abs(off - std::round(off)), hint.off);
+            for (std::int64_t k = -1; k <= 1; ++k)
+                ASSERT_EQ(core::is_inside_by_winding(view, p, k, vp::fill_rule::nonzero, hint, was_summed),
+                          is_on ? k != 0 : core::is_inside_by_sum(vp::fill_rule::nonzero, k, sum, bits));
+        }
+    }
+    EXPECT_GT(known, 500);
+}
+
 } // namespace
 } // namespace solids

@@ -191,9 +191,16 @@ struct node_offset {
     return true;
 }
 
-// The verdict of a sample whose winding number, with the cones, is k.
+// What is known of S at a sample modulo 1: between turns - off and turns + off.
+struct winding_hint {
+    double turns, off; // off of 1/2 or more: nothing is known
+};
+inline constexpr winding_hint no_hint{0.0, 1.0};
+
+// The verdict of a sample whose winding number, with the cones, is k. Sets `was_summed` if it took the whole sum.
 [[nodiscard]] VOXELPIPE_HD inline bool is_inside_by_winding(const winding_view& t, const snapped_position& p,
-                                                            std::int64_t k, fill_rule rule) {
+                                                            std::int64_t k, fill_rule rule, const winding_hint& hint,
+                                                            bool& was_summed) {
     if (t.num_triangles == 0) return is_inside(rule, k);
     const world_point at = to_world(t, p);
     if (is_below_half(t, at, 0.0)) return is_inside(rule, k);
@@ -201,7 +208,8 @@ struct node_offset {
     // As find_whole, but pieces that are near are measured, as long as that is less work than the sum.
     bool is_known = true;
     std::uint32_t left = t.num_triangles / 2 + 16;
-    for (double most = 0x1p-10 * four_pi; is_known && most > 0x1p-22 * four_pi; most *= 0x1p-4) {
+    for (double most = (hint.off < 0.5 ? 0x1p-7 : 0x1p-10) * four_pi; is_known && most > 0x1p-22 * four_pi;
+         most *= 0x1p-4) {
         double sum = 0.0, error = winding_margin(t.num_triangles) * four_pi;
         for (std::uint32_t i = 0; is_known && i < t.num_nodes;) {
             const winding_node& n = t.nodes[i];
@@ -230,13 +238,25 @@ struct node_offset {
             (void)sum_angles(t, p, bits, triangle, triangle + 1, is_on);
             if (is_on) return is_inside(rule, k);
         }
-        const double turns = sum / four_pi, whole = static_cast<double>(exact::round_to_int64(turns));
-        if (is_known && magnitude_of(turns - whole) + error / four_pi < 0.5)
+        double turns = sum / four_pi, doubt = error / four_pi;
+        if (doubt + hint.off < 0.5) { // only one of the numbers that the hint allows is near
+            turns = hint.turns + static_cast<double>(exact::round_to_int64(turns - hint.turns));
+            doubt = hint.off;
+        }
+        const double whole = static_cast<double>(exact::round_to_int64(turns));
+        if (is_known && magnitude_of(turns - whole) + doubt < 0.5)
             return is_inside_beyond(rule, k, static_cast<std::int64_t>(whole));
     }
+    was_summed = true;
     bool is_on = false;
     const std::int64_t sum = sum_angles(t, p, bits, 0, t.num_triangles, is_on);
     return is_on ? is_inside(rule, k) : is_inside_by_sum(rule, k, sum, bits);
+}
+
+[[nodiscard]] VOXELPIPE_HD inline bool is_inside_by_winding(const winding_view& t, const snapped_position& p,
+                                                            std::int64_t k, fill_rule rule) {
+    bool was_summed = false;
+    return is_inside_by_winding(t, p, k, rule, no_hint, was_summed);
 }
 
 // ---- on the host ----------------------------------------------------------------------------------------------------
@@ -252,6 +272,13 @@ public:
         for (std::size_t i = 0; i < cones.triangles.size(); ++i) {
             const glm::uvec3& t = cones.triangles[i];
             items.push_back(make_item(cones.positions[t.x], cones.positions[t.y], cones.positions[t.z], i));
+        }
+        rims_.reserve(items.size());
+        for (const item& i : items) { // an edge of the boundary, and the apex
+            const auto& v = i.piece.vertex;
+            rim_edge& e = rims_.emplace_back();
+            for (int k = 0; k < 3; ++k) e.middle[k] = 0.5 * (v[0][k] + v[1][k]);
+            e.length = length(i, 0);
         }
         items = cut(items, piece_length(items, voxel));
         nodes_.reserve(2 * items.size());
@@ -275,10 +302,71 @@ public:
     // Refers to the object.
     [[nodiscard]] winding_view view() const { return view(nodes_.data(), pieces_.data(), corners_.data()); }
 
+    // S modulo 1 in a brick of 8^3 samples, as a linear function of their indices from 0 to 7.
+    class linear {
+    public:
+        linear() = default;
+        [[nodiscard]] winding_hint at(int x, int y, int z) const {
+            return {turns_ + (x - 3) * slope_[0] + (y - 3) * slope_[1] + (z - 3) * slope_[2], off_};
+        }
+
+    private:
+        friend winding_tree;
+        double turns_ = 0.0, slope_[3] = {0.0, 0.0, 0.0}, off_ = 1.0;
+    };
+    // first: the brick's lowest sample; step: from sample to sample, sub-voxel units. Beside the cones' rims, S is
+    // smooth but for whole steps at the cones: its gradient is that of the line integral of r x dl / r^3 / 4 pi along
+    // the rims, at most the sum of length / r^2, and its second derivative at most that of 2 length / r^3. So four
+    // sums, at the sample (3, 3, 3) and four samples further along each axis, give S to within 16 times the latter
+    // times the square of a voxel's diagonal.
+    [[nodiscard]] linear find_linear(const snapped_position& first, std::int64_t step) const {
+        const winding_view t = view();
+        double diagonal = 0.0, side[3];
+        world_point centre = to_world(t, first);
+        for (int k = 0; k < 3; ++k) {
+            side[k] = scale_.length[k] * static_cast<double>(step);
+            centre.x[k] += 3.5 * side[k];
+            diagonal += side[k] * side[k];
+        }
+        const double reach = 3.5 * std::sqrt(diagonal) * (1.0 + 0x1p-20);
+        double gradient = 0.0, curve = 0.0;
+        for (const rim_edge& e : rims_) {
+            const double gap =
+                std::hypot(e.middle[0] - centre.x[0], e.middle[1] - centre.x[1], e.middle[2] - centre.x[2]) -
+                0.5 * e.length - reach;
+            if (!(gap > 0.0)) return {};
+            gradient += e.length / (gap * gap);
+            curve += 2.0 * e.length / (gap * gap * gap);
+        }
+        linear found;
+        const double off = 16.0 * diagonal * curve / four_pi + winding_margin(t.num_triangles);
+        if (!(off < 0.25 && 4.0 * std::sqrt(diagonal) * gradient < 0.25 * four_pi)) return {};
+        const int bits = angle_bits(t.num_triangles);
+        bool is_on = false;
+        const auto sum_at = [&](int x, int y, int z) {
+            const std::int64_t sum = sum_angles(t, {first.x + x * step, first.y + y * step, first.z + z * step}, bits,
+                                                0, t.num_triangles, is_on);
+            // Modulo 1, so that differences are exact.
+            return std::ldexp(static_cast<double>(sum & ((std::int64_t{1} << bits) - 1)), -bits);
+        };
+        found.turns_ = sum_at(3, 3, 3);
+        const double ends[3] = {sum_at(7, 3, 3), sum_at(3, 7, 3), sum_at(3, 3, 7)};
+        for (int k = 0; k < 3; ++k) {
+            const double change = ends[k] - found.turns_;
+            found.slope_[k] = 0.25 * (change - std::round(change));
+        }
+        if (is_on) return {};
+        found.off_ = off;
+        return found;
+    }
+
 private:
     static constexpr double piece_voxels = 4.0;
     static constexpr double most_pieces = 500000.0; // beyond those that long triangles have at any length
 
+    struct rim_edge {
+        double middle[3], length;
+    };
     // A triangle or a piece of one.
     struct item {
         winding_piece piece;
@@ -399,6 +487,7 @@ private:
     distance_scale scale_{};
     std::vector<winding_node> nodes_;
     std::vector<winding_piece> pieces_;
+    std::vector<rim_edge> rims_;
     std::vector<snapped_position> corners_;
 };
 
