@@ -45,9 +45,7 @@ public:
           bits_(slabs_.size()) {}
 
     // True if all triangles are to be added.
-    [[nodiscard]] static bool needs_triangles(repair kind) {
-        return core::has_cones(kind) || kind == repair::vote;
-    }
+    [[nodiscard]] static bool needs_triangles(repair kind) { return core::has_cones(kind) || kind == repair::vote; }
     // True if the slabs have to be along z.
     [[nodiscard]] static bool is_along_z(repair kind) { return kind == repair::vote || kind == repair::exterior; }
     // True if voxels of a slab may be inside although no triangle reaches it. Its call needs one that is dropped then.
