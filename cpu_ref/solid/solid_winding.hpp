@@ -119,19 +119,21 @@ private:
         centre.x[2] += yz * size.z;
         return core::find_whole(tree, centre, reach * (1.0 + 0x1p-20), core::coarse_bound, whole);
     }
-    // Once several samples of a brick have taken the whole sum, it is a linear function for the others.
+    // Once samples of a brick have taken as much work as some whole sums, these are a linear function for the others.
     void decide_by_sums(const core::winding_tree& cones, const glm::ivec3& first) {
         const core::winding_view tree = cones.view();
         core::winding_tree::linear near;
-        constexpr int most_sums = 4;
-        int sums = 0;
+        const std::uint64_t most_work = std::uint64_t{4} * tree.num_triangles;
+        std::uint64_t work = 0;
+        bool is_linear = false;
         decide(first, [&](const glm::ivec3& at, std::int32_t k) {
             const glm::ivec3 p = at - first;
-            bool was_summed = false;
-            const bool is_in = core::is_inside_by_winding(tree, sample(at.x, at.y, at.z), k, rule_,
-                                                          near.at(p.x, p.y, p.z), was_summed);
-            if (was_summed && ++sums == most_sums)
+            const bool is_in =
+                core::is_inside_by_winding(tree, sample(at.x, at.y, at.z), k, rule_, near.at(p.x, p.y, p.z), work);
+            if (!is_linear && work > most_work) {
+                is_linear = true;
                 near = cones.find_linear(sample(first.x, first.y, first.z), std::int64_t{1} << s_.snap.fraction);
+            }
             return is_in;
         });
     }

@@ -197,10 +197,11 @@ struct winding_hint {
 };
 inline constexpr winding_hint no_hint{0.0, 1.0};
 
-// The verdict of a sample whose winding number, with the cones, is k. Sets `was_summed` if it took the whole sum.
+// The verdict of a sample whose winding number, with the cones, is k. Adds to `work` how many
+// triangles and pieces it has measured.
 [[nodiscard]] VOXELPIPE_HD inline bool is_inside_by_winding(const winding_view& t, const snapped_position& p,
                                                             std::int64_t k, fill_rule rule, const winding_hint& hint,
-                                                            bool& was_summed) {
+                                                            std::uint64_t& work) {
     if (t.num_triangles == 0) return is_inside(rule, k);
     const world_point at = to_world(t, p);
     if (is_below_half(t, at, 0.0)) return is_inside(rule, k);
@@ -208,8 +209,7 @@ inline constexpr winding_hint no_hint{0.0, 1.0};
     // As find_whole, but pieces that are near are measured, as long as that is less work than the sum.
     bool is_known = true;
     std::uint32_t left = t.num_triangles / 2 + 16;
-    for (double most = (hint.off < 0.5 ? 0x1p-7 : 0x1p-10) * four_pi; is_known && most > 0x1p-22 * four_pi;
-         most *= 0x1p-4) {
+    for (double most = 0x1p-5 * four_pi; is_known && most > 0x1p-22 * four_pi; most *= 0x1p-2) {
         double sum = 0.0, error = winding_margin(t.num_triangles) * four_pi;
         for (std::uint32_t i = 0; is_known && i < t.num_nodes;) {
             const winding_node& n = t.nodes[i];
@@ -228,6 +228,7 @@ inline constexpr winding_hint no_hint{0.0, 1.0};
             is_known = left != 0 && find_piece_angle(t.pieces[n.piece], at, angle);
             if (is_known) {
                 --left;
+                ++work;
                 sum += angle;
                 error += 0x1p-24 * four_pi;
                 continue;
@@ -247,7 +248,7 @@ inline constexpr winding_hint no_hint{0.0, 1.0};
         if (is_known && magnitude_of(turns - whole) + doubt < 0.5)
             return is_inside_beyond(rule, k, static_cast<std::int64_t>(whole));
     }
-    was_summed = true;
+    work += t.num_triangles;
     bool is_on = false;
     const std::int64_t sum = sum_angles(t, p, bits, 0, t.num_triangles, is_on);
     return is_on ? is_inside(rule, k) : is_inside_by_sum(rule, k, sum, bits);
@@ -255,8 +256,8 @@ inline constexpr winding_hint no_hint{0.0, 1.0};
 
 [[nodiscard]] VOXELPIPE_HD inline bool is_inside_by_winding(const winding_view& t, const snapped_position& p,
                                                             std::int64_t k, fill_rule rule) {
-    bool was_summed = false;
-    return is_inside_by_winding(t, p, k, rule, no_hint, was_summed);
+    std::uint64_t work = 0;
+    return is_inside_by_winding(t, p, k, rule, no_hint, work);
 }
 
 // ---- on the host ----------------------------------------------------------------------------------------------------
