@@ -195,7 +195,6 @@ struct node_offset {
 struct winding_hint {
     double turns, off; // off of 1/2 or more: nothing is known
 };
-inline constexpr winding_hint no_hint{0.0, 1.0};
 
 // The verdict of a sample whose winding number, with the cones, is k. Adds to `work` how many
 // triangles and pieces it has measured.
@@ -257,7 +256,7 @@ inline constexpr winding_hint no_hint{0.0, 1.0};
 [[nodiscard]] VOXELPIPE_HD inline bool is_inside_by_winding(const winding_view& t, const snapped_position& p,
                                                             std::int64_t k, fill_rule rule) {
     std::uint64_t work = 0;
-    return is_inside_by_winding(t, p, k, rule, no_hint, work);
+    return is_inside_by_winding(t, p, k, rule, winding_hint{0.0, 1.0}, work);
 }
 
 // ---- on the host ----------------------------------------------------------------------------------------------------
