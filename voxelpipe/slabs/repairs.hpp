@@ -6,7 +6,7 @@
 // slabs, and given to the call of each slab (solid_options::cones and ::slab). Plain C++; a backend draws the cover.
 // Needs POSIX files.
 //
-//   close_holes   add() all triangles, begin();              of() each slab
+//   close_holes, and winding as well: add() all triangles, begin();              of() each slab
 //   vote          add() all triangles, begin();              enter() each slab with its triangles, of(), leave()
 //   exterior      begin(), add_walls() of all slabs, flood(); of() each slab
 
