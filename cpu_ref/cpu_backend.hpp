@@ -7,6 +7,7 @@
 
 #include <cpu_ref/abuffer_pass.hpp>
 #include <cpu_ref/framebuffer_pass.hpp>
+#include <voxelpipe/core/threads.hpp>
 #include <voxelpipe/stage_times.hpp>
 #include <voxelpipe/voxelize.hpp>
 
@@ -34,7 +35,7 @@ public:
     template <class T>
     class buffer {
     public:
-        buffer(cpu_backend&, std::size_t count) : data_(allocate(count)), count_(count) {}
+        buffer(cpu_backend&, std::uint64_t count) : data_(allocate(count)), count_(core::length_of(count)) {}
         buffer(cpu_backend&, array_view<const T> source) : data_(allocate(source.size())), count_(source.size()) {
             std::copy(source.begin(), source.end(), data_.get());
         }
@@ -69,12 +70,12 @@ public:
         struct release {
             void operator()(T* p) const { ::operator delete(p, alignment); }
         };
-        static T* allocate(std::size_t count) {
+        static T* allocate(std::uint64_t count) {
             static_assert(std::is_trivially_copyable_v<T>,
                           "voxelpipe: what a backend stores must be trivially copyable");
             if (count == 0) return nullptr;
             if (count > std::numeric_limits<std::size_t>::max() / 2 / sizeof(T)) throw std::bad_alloc();
-            return static_cast<T*>(::operator new(count * sizeof(T), alignment));
+            return static_cast<T*>(::operator new(core::length_of(count) * sizeof(T), alignment));
         }
         std::unique_ptr<T[], release> data_;
         std::size_t count_;

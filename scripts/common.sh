@@ -128,4 +128,19 @@ configure() {
     }
 }
 
+# fetch_sources FOLDER PACKAGE...: the sources of this machine's distribution, with its patches, unpacked in FOLDER/src. Needs no root.
+fetch_sources() {
+    local folder=$1 apt
+    shift
+    [[ ! -e $folder/src/complete ]] || return 0
+    mkdir -p "$folder"/{src,apt/lists/partial,apt/parts}
+    # The machine's own list, of sources in place of packages.
+    sed 's/^Types: deb$/Types: deb-src/' /etc/apt/sources.list.d/*.sources >"$folder/apt/parts/src.sources" 2>/dev/null || true
+    sed -n 's/^deb /deb-src /p' /etc/apt/sources.list >"$folder/apt/parts/src.list" 2>/dev/null || true
+    apt=(apt-get -qq -o Dir::Etc::sourcelist=/dev/null -o Dir::Etc::sourceparts="$folder/apt/parts" -o Dir::State::lists="$folder/apt/lists")
+    "${apt[@]}" update
+    (cd "$folder/src" && "${apt[@]}" source "$@" >"$folder/source.log" 2>&1) || { cat "$folder/source.log"; die "no sources"; }
+    touch "$folder/src/complete"
+}
+
 jobs="${VOXELPIPE_JOBS:-$(nproc)}"

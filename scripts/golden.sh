@@ -9,7 +9,7 @@
 #
 # RUNNER starts the programs of another machine, such as qemu-aarch64-static or wine64: --build names a build for that.
 #
-#   --build FOLDER   with tests/golden/golden_hashes and tool/voxelize, or .exe; by default
+#   --build FOLDER   with tests/golden/golden_hashes and tool/voxelize, or .exe or .wasm; by default
 #                    $VOXELPIPE_GOLDEN_BUILD, else build/test
 #   --program FILE   instead of FOLDER/tests/golden/golden_hashes
 #   --tool FILE      instead of FOLDER/tool/voxelize
@@ -85,7 +85,7 @@ fi
 # A program of the build, with the suffix that it has there.
 find_program() {
     local file
-    for file in "$1" "$1.exe"; do
+    for file in "$1" "$1.exe" "$1.wasm"; do
         [[ -f $file ]] || continue
         printf '%s' "$file"
         return 0

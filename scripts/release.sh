@@ -6,6 +6,7 @@
 #   voxelpipe-VERSION.tar.gz                       the source archive (scripts/dist.sh --test)
 #   *.whl, wheels-ARCH.txt                         wheels and what their tests said (scripts/wheels.sh)
 #   voxelize-VERSION-linux-ARCH.tar.gz             the tool, as those wheels bring it, with its licences
+#   voxelize-VERSION.html                          the page that converts models in the browser (scripts/page.sh --check)
 #   voxelpipe-blender-VERSION.zip                  the Blender add-on with these wheels (scripts/blender.sh)
 #   voxelpipe-VERSION-site.tar.gz                  the site (scripts/docs.sh --check)
 #   recipes.tar.gz                                 vcpkg, Conan, Spack and conda, with the archive's hashes (packaging/fill.py)
@@ -16,10 +17,10 @@
 #   scripts/release.sh [--repository URL] [--draft] [PART...]
 #       --repository: where the archive will lie, for recipes and the site's links; without it there are no recipes
 #       --draft: of files that differ from the commit, or of a version without a tag
-#       PART: archive, wheels, arm, tool, blender, site, recipes or notes; all by default, those before left as they are
+#       PART: archive, wheels, arm, tool, page, blender, site, recipes or notes; all by default, those before left as they are
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
-all=(archive wheels arm tool blender site recipes notes)
+all=(archive wheels arm tool page blender site recipes notes)
 repository='' draft=0 parts=()
 while [[ $# -gt 0 ]]; do
     case $1 in
@@ -82,6 +83,10 @@ make_tool() {
     done
     rm -rf "$folder/work"
     [[ $made -eq 1 ]] || die "no wheel to take the tool from: scripts/release.sh wheels"
+}
+make_page() {
+    scripts/page.sh --check
+    cp build/page/voxelize.html "$folder/voxelize-$version.html"
 }
 make_blender() {
     local wheels

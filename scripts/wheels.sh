@@ -28,7 +28,7 @@ max_seconds=10
 shared=$root/build/wheels
 folder=$shared/$arch
 dist=$shared/dist
-mkdir -p "$shared"/{src,apt/lists/partial,apt/parts} "$folder/bin" "$dist"
+mkdir -p "$folder/bin" "$dist"
 
 pythons=("$@")
 if [[ ${#pythons[@]} -eq 0 ]]; then
@@ -66,22 +66,11 @@ cmake_options=(-DCMAKE_C_COMPILER="$folder/bin/clang" -DCMAKE_CXX_COMPILER="$fol
 [[ $arch == x86_64 ]] || cmake_options+=(-DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR="$arch")
 unset LDFLAGS # which names a linker of this machine
 
-fetch_sources() {
-    [[ ! -e $shared/src/complete ]] || return 0
-    # The machine's own list, of sources in place of packages.
-    sed 's/^Types: deb$/Types: deb-src/' /etc/apt/sources.list.d/*.sources >"$shared/apt/parts/src.sources" 2>/dev/null || true
-    sed -n 's/^deb /deb-src /p' /etc/apt/sources.list >"$shared/apt/parts/src.list" 2>/dev/null || true
-    apt=(apt-get -qq -o Dir::Etc::sourcelist=/dev/null -o Dir::Etc::sourceparts="$shared/apt/parts" -o Dir::State::lists="$shared/apt/lists")
-    "${apt[@]}" update
-    (cd "$shared/src" && "${apt[@]}" source "${sources[@]}" >"$shared/source.log" 2>&1) || { cat "$shared/source.log"; die "no sources"; }
-    touch "$shared/src/complete"
-}
-
 prefix=$folder/prefix
 sources=(zlib libdeflate libzstd libwebp draco meshoptimizer)
 if [[ ! -e $prefix/complete ]]; then
     say "building the libraries that wheels have within: ${sources[*]}"
-    fetch_sources
+    fetch_sources "$shared" "${sources[@]}"
     cmake -G Ninja -S packaging/wheels -B "$folder/libraries" -DSOURCES="$shared/src" -DCMAKE_BUILD_TYPE=Release \
         -DCMAKE_INSTALL_PREFIX="$prefix" "${cmake_options[@]}" >"$folder/libraries.log" 2>&1 || { cat "$folder/libraries.log"; die "libraries"; }
     cmake --build "$folder/libraries" -j "$jobs" >>"$folder/libraries.log" 2>&1 || { tail -n 50 "$folder/libraries.log"; die "libraries"; }

@@ -156,6 +156,10 @@ struct cell_counters {
     std::uint64_t open_edges = 0;     // snapped edges that no opposite edge cancels; 0 if they were not counted
     std::uint64_t cell_records = 0;   // parts of triangles in voxels, before and behind the grid
     std::uint64_t lost_centroids = 0; // with cell_value::centroid: fragments that have the voxel's centre instead
+    // repair::close_holes only; the cones' edges count for open_edges:
+    std::uint64_t hole_edges = 0; // edges that no opposite edge cancels
+    std::uint64_t holes = 0;      // their connected components
+    std::uint64_t cones = 0;      // holes that were closed
 
     // The volume in voxels, rounded to double.
     [[nodiscard]] double volume() const {

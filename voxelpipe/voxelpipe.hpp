@@ -9,6 +9,7 @@
 #include <voxelpipe/abuffer.hpp>
 #include <voxelpipe/blend.hpp>
 #include <voxelpipe/cells/cells.hpp>
+#include <voxelpipe/cells/links.hpp>
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/distance/distance.hpp>
 #include <voxelpipe/distance/distance_ray.hpp>

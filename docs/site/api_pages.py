@@ -37,7 +37,7 @@ CPP = {
                   ["distance/distance.hpp", "distance/sparse_distance.hpp", "distance/distance_ray.hpp",
                    "distance/core/point_triangle.hpp", "distance/core/row_crossing.hpp"]),
     "label": ("Labels", "Connected components of bits.", ["label/label.hpp", "label/voxel_component.hpp"]),
-    "cells": ("Cut cells", "How much of each voxel is inside.", ["cells/cells.hpp"]),
+    "cells": ("Cut cells", "How much of each voxel is inside, and where links between voxels are cut.", ["cells/cells.hpp", "cells/links.hpp", "cells/core/link_crossing.hpp"]),
     "sparse": ("Sparse grids", "Memory in proportion to the voxels that are drawn: bricks, octrees, files.",
                ["sparse/sparse.hpp", "sparse/host_sparse.hpp", "sparse/sparse_merge.hpp", "core/brick_table.hpp", "core/brick_tile.hpp", "sparse/brick_lookup.hpp", "sparse/octree.hpp", "core/octree_view.hpp",
                 "levels/reducers.hpp", "sparse/octree_dag.hpp", "sparse/backend_octree.hpp", "sparse/backend_octree_dag.hpp", "core/octree_dag_view.hpp", "sparse/io/nanovdb.hpp"]),
@@ -72,6 +72,7 @@ TASKS = [
     ("A closed mesh of any triangles", "samples/19_remesh.cpp", "remesh", "surfaces"),
     ("Colours of its vertices", "samples/20_scan.cpp", "call", "surfaces"),
     ("How much of a voxel is inside", "samples/guide/solids.cpp", "fractions", "cells"),
+    ("Links that a mesh cuts", "samples/24_links.cpp", "links", "cells"),
     ("Connected components", "samples/guide/solids.cpp", "labels", "label"),
     ("Instances", "samples/09_forest.cpp", "instances", "meshes"),
     ("Points", "samples/08_points.cpp", "points", "meshes"),
@@ -88,12 +89,12 @@ TASKS = [
 ]
 # Shown nowhere: what the library uses to write NanoVDB files.
 HIDDEN = ["sparse/io/nanovdb_nodes.hpp"]
-PYTHON = ["Grid", "fit", "load_model", "Model", "Material", "Texture", "Part", "voxelize", "solid", "tiles", "distance", "distance_at", "fractions", "label", "remesh", "extract",
+PYTHON = ["Grid", "fit", "load_model", "Model", "Material", "Texture", "Part", "voxelize", "solid", "tiles", "distance", "distance_at", "fractions", "links", "Links", "label", "remesh", "extract",
           "bake", "sparse", "dense", "VoxelList", "lines", "points", "instances", "Octree", "Hits", "fragments", "Fragments", "save", "formats", "render", "view", "View",
           "DroppedTrianglesWarning", "OpenMeshWarning", "ModelWarning", "WriteError"]
 # Pictures of functions that docs/site/python_pictures.py makes none of.
 PYTHON_PICTURES = {"load_model": "docs/lighthouse.png", "render": "docs/torus.png", "view": "docs/gallery/page.png",
-                   "distance_at": "docs/python/distance.png"}
+                   "distance_at": "docs/python/distance.png", "links": "docs/gallery/links.png"}
 
 
 def picture_of(name):

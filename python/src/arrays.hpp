@@ -77,6 +77,7 @@ void bind_distance(nb::module_& m);
 void bind_remesh(nb::module_& m);
 void bind_fractions(nb::module_& m);
 void bind_label(nb::module_& m);
+void bind_links(nb::module_& m);
 void bind_sparse_float(nb::module_& m);
 void bind_sparse_integer(nb::module_& m);
 void bind_files(nb::module_& m);

@@ -84,12 +84,10 @@ struct measuring : fraction_and_faces {
 };
 
 template <class Shader>
-status draw_cells(const position_array& positions, const triangle_array& triangles, const grid& g, int axis, float* out,
-                  const Shader& shader, unsigned threads) {
+status draw_cells(const position_array& positions, const triangle_array& triangles, const grid& g,
+                  const cell_options& options, float* out, const Shader& shader, unsigned threads) {
     using cell_draw = draw<mesh_view<>, passthrough, Shader>;
     const auto draws = draws_of_parts<cell_draw>(view_of(positions, triangles), std::vector<std::uint64_t>{0}, shader);
-    cell_options options;
-    options.axis = axis;
     const nb::gil_scoped_release released;
     cpu_backend backend{threads};
     return voxelize_cells(backend, draws, g, framebuffer_view<target<float, blend::replace>>::on(g.extent, out),
@@ -98,13 +96,18 @@ status draw_cells(const position_array& positions, const triangle_array& triangl
 
 // Fractions of all triangles together, into an array of the grid's shape, by rows along an axis; and of the voxels'
 // faces across that axis their fractions inside, and the component of the mesh's area vector, into arrays of zeros; and
-// what is measured within voxels.
+// what is measured within voxels. close_holes: repair::close_holes, of holes of at most max_hole_edges.
 nb::dict fractions_of(const position_array& positions, const triangle_array& triangles, const grid& g, int axis,
                       const array<float, 3>& out, const std::optional<array<double, 3>>& apertures,
                       const std::optional<array<double, 4>>& areas, const std::optional<array<float, 4>>& centroids,
                       const std::optional<array<double, 3>>& sizes,
                       const std::optional<array<float, 4>>& area_centroids,
-                      const std::optional<array<bool, 3>>& multi_cuts, unsigned threads) {
+                      const std::optional<array<bool, 3>>& multi_cuts, bool close_holes,
+                      std::optional<std::uint64_t> max_hole_edges, unsigned threads) {
+    cell_options options;
+    options.axis = axis;
+    if (close_holes) options.repair = repair::close_holes;
+    if (max_hole_edges) options.max_hole_edges = *max_hole_edges;
     expect_shape(out, g, "the result");
     fraction_and_faces shader{{nullptr, nullptr, 1, g.extent, g.offset, axis}};
     if (apertures) {
@@ -136,8 +139,8 @@ nb::dict fractions_of(const position_array& positions, const triangle_array& tri
         inner.multi_cuts = multi_cuts->data();
     }
     const status s = inner.any()
-                         ? draw_cells(positions, triangles, g, axis, out.data(), measuring{shader, inner}, threads)
-                         : draw_cells(positions, triangles, g, axis, out.data(), shader, threads);
+                         ? draw_cells(positions, triangles, g, options, out.data(), measuring{shader, inner}, threads)
+                         : draw_cells(positions, triangles, g, options, out.data(), shader, threads);
     nb::dict d = report(s);
     d["cut_voxels"] = s.cells.cut_voxels;
     d["below_zero"] = s.cells.below_zero;
@@ -145,6 +148,9 @@ nb::dict fractions_of(const position_array& positions, const triangle_array& tri
     d["open_rows"] = s.cells.open_rows;
     d["open_edges"] = s.cells.open_edges;
     d["lost_centroids"] = s.cells.lost_centroids;
+    d["hole_edges"] = s.cells.hole_edges;
+    d["holes"] = s.cells.holes;
+    d["cones"] = s.cells.cones;
     return d;
 }
 
@@ -153,7 +159,8 @@ nb::dict fractions_of(const position_array& positions, const triangle_array& tri
 void bind_fractions(nb::module_& m) {
     m.def("fractions", &fractions_of, nb::arg("positions"), nb::arg("triangles"), nb::arg("grid"), nb::arg("axis"),
           nb::arg("out"), nb::arg("apertures").none(), nb::arg("areas").none(), nb::arg("centroids").none(),
-          nb::arg("sizes").none(), nb::arg("area_centroids").none(), nb::arg("multi_cuts").none(), nb::arg("threads"));
+          nb::arg("sizes").none(), nb::arg("area_centroids").none(), nb::arg("multi_cuts").none(),
+          nb::arg("close_holes"), nb::arg("max_hole_edges").none(), nb::arg("threads"));
 }
 
 } // namespace voxelpipe::python

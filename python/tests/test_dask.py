@@ -71,6 +71,14 @@ def test_blocks_are_parts_of_the_whole():
         check(lazy, whole)
 
 
+def test_blocks_close_the_holes_of_the_whole():
+    mesh = [(vertices, np.delete(triangles, 3, axis=0)) for vertices, triangles in ball_and_box()]
+    grid, status = vp.fit(mesh, 40), {}
+    whole = vp.fractions(mesh, grid, repair="close_holes", status=status)
+    assert status["cones"] == 2 and status["open_edges"] == 0
+    check(vp.dask.fractions(mesh, grid, CHUNKS, repair="close_holes"), whole)
+
+
 def test_a_cluster_of_two_processes_gives_the_whole(client):
     mesh = ball_and_box()
     for lazy, whole in calls(mesh, vp.fit(mesh, 40)).values():

@@ -171,3 +171,30 @@ def test_open_meshes_warn_and_mistakes_are_named():
         vp.fractions((vertices, np.array([[0, 1, 99]])), GRID)
     empty = vp.fractions((np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint32)), GRID)
     assert empty.shape == GRID.shape and not empty.any()
+
+
+def test_closed_holes_are_those_of_the_closed_box():
+    low, high = (0.625, 0.375, 1.25), (3.875, 3.0625, 6.5)
+    vertices, triangles = box(low, high)
+    corners = np.asarray(vertices)[np.asarray(triangles)]
+    is_side = (corners[:, :, 0] == high[0]).all(axis=1)
+    open_box = (vertices, np.asarray(triangles)[~is_side])
+    assert is_side.sum() == 2
+    expected, status = box_fractions(GRID, low, high), {}
+    closed = vp.fractions(open_box, GRID, repair="close_holes", status=status)
+    assert np.abs(closed - expected).max() < 1e-7
+    assert [status[name] for name in ("open_edges", "open_rows", "hole_edges", "holes", "cones")] == [0, 0, 4, 1, 1]
+    both = vp.fractions([open_box, open_box], GRID, bodies="each", repair="close_holes", status=status)
+    assert np.array_equal(both[0], closed) and np.array_equal(both[1], closed) and status["cones"] == 2
+    with pytest.warns(vp.OpenMeshWarning):
+        left = vp.fractions(open_box, GRID, repair="close_holes", max_hole_edges=3, status=status)
+    assert [status[name] for name in ("open_edges", "holes", "cones")] == [4, 1, 0]
+    with pytest.warns(vp.OpenMeshWarning):
+        assert np.array_equal(left, vp.fractions(open_box, GRID, status=status))
+    assert status["holes"] == 0
+    measured = vp.fractions(open_box, GRID, of=("area", "area_vector"), repair="close_holes")
+    size = np.subtract(high, low)
+    assert measured["area"].sum() == pytest.approx(2 * (size[0] * size[1] + size[1] * size[2] + size[2] * size[0]))
+    assert np.abs(measured["area_vector"].sum(axis=(0, 1, 2))).max() < 1e-9
+    with pytest.raises(ValueError, match="repair"):
+        vp.fractions(open_box, GRID, repair="vote")

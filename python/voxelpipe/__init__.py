@@ -27,6 +27,7 @@ from ._distance import distance, distance_at
 from ._fit import fit
 from ._fractions import fractions
 from ._label import label
+from ._links import Links, links
 from ._model import Material, Model, ModelWarning, Part, Texture, load_model
 from ._octree import Hits, Octree
 from ._remesh import extract, remesh
@@ -46,6 +47,7 @@ __all__ = [
     "Fragments",
     "Grid",
     "Hits",
+    "Links",
     "Material",
     "Model",
     "ModelWarning",
@@ -68,6 +70,7 @@ __all__ = [
     "instances",
     "label",
     "lines",
+    "links",
     "load_model",
     "points",
     "remesh",

@@ -12,7 +12,7 @@ from ._core import Grid
 from ._distance import _host_mesh
 from ._solid import OpenMeshWarning
 from ._surface import take_counts
-from ._types import Bodies, CellValue, MeshLike, check_call, check_choice
+from ._types import Bodies, CellValue, HoleRepair, MeshLike, check_call, check_choice, whole_number
 
 _APERTURES = ("aperture_x", "aperture_y", "aperture_z")
 # What is measured within a voxel, in the order of the call: the type and the shape of a voxel's values.
@@ -31,6 +31,8 @@ def fractions(
     *,
     of: CellValue = "fraction",
     bodies: Bodies = "all",
+    repair: HoleRepair = "none",
+    max_hole_edges: int | None = None,
     threads: int = 0,
     status: dict[str, int] | None = None,
 ) -> Any: ...
@@ -43,6 +45,8 @@ def fractions(
     *,
     of: Sequence[CellValue],
     bodies: Bodies = "all",
+    repair: HoleRepair = "none",
+    max_hole_edges: int | None = None,
     threads: int = 0,
     status: dict[str, int] | None = None,
 ) -> dict[str, Any]: ...
@@ -54,6 +58,8 @@ def fractions(
     *,
     of: CellValue | Sequence[CellValue] = "fraction",
     bodies: Bodies = "all",
+    repair: HoleRepair = "none",
+    max_hole_edges: int | None = None,
     threads: int = 0,
     status: dict[str, int] | None = None,
 ) -> Any:
@@ -81,11 +87,14 @@ def fractions(
             sheet where edges join them that meet the voxel.
         bodies: "all", the sum over all bodies; "each", arrays with one more axis in front, (n, nz, ny, nx), of every body by
             itself, for materials that share a voxel.
+        repair, max_hole_edges: "close_holes" puts a cone over the boundary of each hole of each body, as in solid(); holes
+            with more edges stay open. Cones are triangles of the mesh then, which cut voxels and have areas.
         threads: 0 takes all cores. The result is the same for any number.
         status: a dict that is filled with the call's counters, those of rows along x, with "each" their sums over the
             bodies: cut_voxels that a triangle's inside reaches; below_zero and above_one, voxels that are below 0 or above 1
             by more than 2^-24; open_edges without an opposite edge; open_rows, rows of voxels along every axis that was
-            asked for whose triangles do not balance; and lost_centroids, voxels that have their centre instead.
+            asked for whose triangles do not balance; lost_centroids, voxels that have their centre instead; and with
+            "close_holes" hole_edges, holes and the cones that close them, after which open_edges are those that are left.
 
     Returns the values; a mesh of torch's tensors gives tensors. Warns with OpenMeshWarning where rows prove that the mesh
     is not closed. Raises IndexError for a triangle that names a vertex that does not exist, TypeError for a mesh in a GPU's
@@ -99,6 +108,9 @@ def fractions(
     """
     check_call("fractions", grid, "conservative", threads, status)
     check_choice("bodies", bodies, Bodies)
+    check_choice("repair", repair, HoleRepair)
+    if max_hole_edges is not None:
+        whole_number("max_hole_edges", max_hole_edges)
     wanted = [of] if isinstance(of, str) else list(of)
     for name in wanted:
         check_choice("of", name, CellValue)
@@ -139,6 +151,8 @@ def fractions(
                 within[1],
                 within[2],
                 within[3],
+                repair == "close_holes",
+                max_hole_edges,
                 threads,
             )
             open_rows += of_body["open_rows"]

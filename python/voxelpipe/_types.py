@@ -18,6 +18,8 @@ Fill = Literal["nonzero", "even_odd", "positive"]
 Sign = Literal["nonzero", "even_odd", "positive", "unsigned"]
 Extent = Literal["outer", "centre", "center", "inner"]
 Repair = Literal["none", "close_holes", "exterior", "vote", "winding"]
+# Those that leave a mesh.
+HoleRepair = Literal["none", "close_holes"]
 Bodies = Literal["all", "each"]
 # What fractions() measures of every voxel.
 CellValue = Literal[

@@ -26,7 +26,7 @@ from ._arrays import is_on_device, to_numpy
 from ._core import Grid
 from ._mesh import _parts_of
 from ._model import Model, load_model
-from ._types import Bodies, Coverage, Extent, Fill, MeshLike, Repair, Sign
+from ._types import Bodies, Coverage, Extent, Fill, HoleRepair, MeshLike, Repair, Sign
 
 __all__ = ["Outcome", "distance", "fractions", "map_models", "solid", "voxelize"]
 
@@ -177,18 +177,28 @@ def distance(
     )
 
 
-def fractions(mesh: MeshLike, grid: Grid, chunks: Any = "auto", *, bodies: Bodies = "all", threads: int = 1) -> Any:
+def fractions(
+    mesh: MeshLike,
+    grid: Grid,
+    chunks: Any = "auto",
+    *,
+    bodies: Bodies = "all",
+    repair: HoleRepair = "none",
+    max_hole_edges: int | None = None,
+    threads: int = 1,
+) -> Any:
     """voxelpipe.fractions() as a lazy array of float32, (nz, ny, nx): how much of every voxel is inside.
 
     Args:
         mesh, grid, chunks, threads: as in voxelize() here.
-        bodies: as in voxelpipe.fractions().
+        bodies, repair, max_hole_edges: as in voxelpipe.fractions(); each block closes the holes of the whole mesh.
 
     Example:
         >>> density = vp.dask.fractions("part.stl", vp.fit("part.stl", 2048), chunks=256)
         >>> density.map_blocks(np.sqrt).to_zarr("density.zarr")
     """
-    return _array(mesh, grid, chunks, np.float32, _fractions.fractions, bodies=bodies, threads=threads)
+    options = {"bodies": bodies, "repair": repair, "max_hole_edges": max_hole_edges, "threads": threads}
+    return _array(mesh, grid, chunks, np.float32, _fractions.fractions, **options)
 
 
 class Outcome(NamedTuple):

@@ -235,6 +235,89 @@ TEST(Cells, OpenMeshesAreToldByRowsAndEdges) {
     EXPECT_EQ(library_cells(m, g).status.cells.volume(), 0.0);
 }
 
+// A box without triangles whose normals look along an axis, to one side.
+mesh box_without_side(const glm::vec3& low, const glm::vec3& high, int axis, bool upper) {
+    mesh m = solids::box(low, high);
+    std::erase_if(m.triangles, [&](const glm::uvec3& t) {
+        const float at = upper ? high[axis] : low[axis];
+        return m.positions[t.x][axis] == at && m.positions[t.y][axis] == at && m.positions[t.z][axis] == at;
+    });
+    EXPECT_EQ(m.triangles.size(), 10u);
+    return m;
+}
+
+// The cone over a flat side is the side: the fractions are the closed box's, by all axes.
+TEST(Cells, ClosedHolesHaveTheFractionsOfTheClosedMesh) {
+    const glm::vec3 low(0.75F, 1.5F, 1.25F), high(5.25F, 4.0F, 5.75F);
+    const vp::grid g = solids::unit_grid({7, 6, 8});
+    for (int i = 0; i < 18; ++i) {
+        const int side = i / 2 % 3, axis = i / 6;
+        const mesh open = box_without_side(low, high, side, i % 2 != 0);
+        const auto whole = library_cells(solids::box(low, high), g, {.axis = axis}),
+                   closed = library_cells(open, g, {.axis = axis, .repair = vp::repair::close_holes});
+        const vp::status& s = closed.status;
+        EXPECT_EQ(s.cells.open_edges, 0u);
+        EXPECT_EQ(s.cells.open_rows, 0u);
+        EXPECT_EQ(s.cells.hole_edges, 4u);
+        EXPECT_EQ(s.cells.holes, 1u);
+        EXPECT_EQ(s.cells.cones, 1u);
+        EXPECT_EQ(s.counts.triangles_in, 10u);
+        EXPECT_EQ(s.counts.triangles_drawn, 10u);
+        EXPECT_EQ(closed.cut, whole.cut);
+        for (std::size_t v = 0; v < whole.units.size(); ++v) {
+            EXPECT_NEAR(static_cast<double>(closed.units[v]), static_cast<double>(whole.units[v]), 16 * bound);
+            if (whole.cut[v] == 0) {
+                EXPECT_EQ(closed.units[v], whole.units[v]);
+            }
+        }
+        // A larger hole than is asked for stays, and says so.
+        const auto left =
+                       library_cells(open, g, {.axis = axis, .repair = vp::repair::close_holes, .max_hole_edges = 3}),
+                   none = library_cells(open, g, {.axis = axis});
+        EXPECT_EQ(left.status.cells.open_edges, 4u);
+        EXPECT_EQ(left.status.cells.holes, 1u);
+        EXPECT_EQ(left.status.cells.cones, 0u);
+        EXPECT_EQ(none.status.cells.open_edges, 4u);
+        EXPECT_EQ(none.status.cells.holes, 0u);
+        EXPECT_EQ(left.units, none.units);
+        if (side == axis) {
+            EXPECT_GT(none.status.cells.open_rows, 0u);
+            EXPECT_NE(none.units, whole.units);
+        }
+    }
+}
+
+// Holes are those of a body, and a crop closes those of the whole mesh.
+TEST(Cells, HolesAreThoseOfBodiesAndOfTheWholeGrid) {
+    const glm::vec3 low(0.75F, 1.5F, 1.25F), middle(3.5F, 4.0F, 5.75F), high(6.25F, 4.0F, 5.75F);
+    const vp::grid g = solids::unit_grid({8, 6, 7});
+    // Two boxes that meet where they are open: as one body they are closed.
+    const mesh left = box_without_side(low, middle, 0, true),
+               right = box_without_side({middle.x, low.y, low.z}, high, 0, false);
+    const vp::cell_options of_call{.repair = vp::repair::close_holes};
+    const vp::cell_options of_draws{.bodies = vp::bodies::draw, .repair = vp::repair::close_holes};
+    const auto one = library_cells(std::vector{left, right}, g, of_call),
+               two = library_cells(std::vector{left, right}, g, of_draws);
+    EXPECT_EQ(one.status.cells.holes, 0u);
+    EXPECT_EQ(two.status.cells.cones, 2u);
+    EXPECT_EQ(two.status.cells.open_edges, 0u);
+    EXPECT_EQ(two.status.cells.open_rows, 0u);
+    for (std::size_t v = 0; v < one.units.size(); ++v) EXPECT_NEAR(one.fractions[v], two.fractions[v], 0x1p-22F);
+    // Each body by itself is the body that it would be alone; the last one's fragment is what a voxel keeps.
+    const auto alone = library_cells(right, g, of_call);
+    for (int z = 0; z < 7; ++z)
+        for (int y = 0; y < 6; ++y)
+            for (int x = 4; x < 8; ++x) EXPECT_EQ(two.units[two.index(x, y, z)], alone.units[alone.index(x, y, z)]);
+    const glm::ivec3 begin(4, 1, 2), size(3, 4, 3); // without the hole at x = 3.5
+    const auto part = library_cells(right, g.crop(begin, size), of_call);
+    EXPECT_EQ(part.status.cells.cones, 1u);
+    for (int z = 0; z < size.z; ++z)
+        for (int y = 0; y < size.y; ++y)
+            for (int x = 0; x < size.x; ++x)
+                EXPECT_EQ(part.units[part.index(x, y, z)],
+                          alone.units[alone.index(x + begin.x, y + begin.y, z + begin.z)]);
+}
+
 TEST(Cells, BadInput) {
     mesh m = solids::box({1, 1, 1}, {3, 3, 3});
     const vp::grid g = solids::unit_grid(glm::ivec3(5));
@@ -257,6 +340,8 @@ TEST(Cells, BadInput) {
     const std::vector<float> before = vp::get<0>(fb).to_host(backend);
     EXPECT_EQ(draw(m, {.axis = 3}).code, vp::status_code::bad_cell_options);
     EXPECT_EQ(draw(m, {.axis = -1}).code, vp::status_code::bad_cell_options);
+    for (const vp::repair r : {vp::repair::vote, vp::repair::exterior})
+        EXPECT_EQ(draw(m, {.repair = r}).code, vp::status_code::bad_cell_options);
     m.triangles.push_back({0, 1, 99});
     const vp::status bad = draw(m, {});
     EXPECT_EQ(bad.code, vp::status_code::index_out_of_range);

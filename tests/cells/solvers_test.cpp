@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Code of docs/solvers.md: what codes with embedded boundaries read, from one call for each axis.
+// Code of docs/solvers.md: what codes with embedded boundaries read, from one call for each axis; links into walls.
 #include "../solids/solid_support.hpp"
 
 #include <cpu_ref/backend.hpp>
@@ -52,6 +52,29 @@ cut_cells find_cut_cells(const vp::mesh_view<>& mesh, const vp::grid& grid) {
 }
 // end snippet
 
+// snippet: bounce
+// Bouzidi, Firdaouss and Lallemand's linear rule: what arrives from a wall at rest. f is what streams towards it.
+float bounced(float q, float f_here, float f_behind, float f_opposite) {
+    if (q < 0.5F) return 2 * q * f_here + (1 - 2 * q) * f_behind;
+    return f_here / (2 * q) + (1 - 1 / (2 * q)) * f_opposite;
+}
+
+// Calls apply(node, link, q) for every link of a node in the fluid into the wall.
+template <class IsWall, class Apply>
+void for_each_wall_link(const vp::mesh_view<>& mesh, const vp::grid& grid, const IsWall& is_wall, const Apply& apply) {
+    vp::cpu_backend backend;
+    vp::link_list<vp::cpu_backend> links(backend);
+    vp::voxelize_links(backend, mesh, grid, vp::passthrough{}, links, {.neighbours = 18}).or_throw();
+    const std::vector<glm::ivec3> nodes = links.voxels.to_host(backend);
+    const std::vector<float> q = links.q.to_host(backend);
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+        for (int link = 0; link < 18; ++link) {
+            const float part = q[18 * i + static_cast<std::size_t>(link)];
+            if (part > 0 && !is_wall(nodes[i])) apply(nodes[i], link, part);
+        }
+}
+// end snippet
+
 // A voxel's walls and faces close, and on a closed mesh the walls of all voxels do.
 TEST(Solvers, CutCellsClose) {
     const solids::mesh ball = solids::sphere({8.1F, 7.9F, 8.3F}, 6.2F, 3);
@@ -72,6 +95,34 @@ TEST(Solvers, CutCellsClose) {
     }
     EXPECT_LT(500, cut);
     EXPECT_EQ((std::array<double, 3>{}), sum);
+}
+
+// Links of the fluid end in the wall where the box's faces are, and the rule is exact for what is linear along a link:
+// below a half it takes what starts 1 - q from the wall, else what passes the node between two that it knows.
+TEST(Solvers, LinksBounceAtTheFaces) {
+    const solids::mesh box = solids::box({3.25F, 2.625F, 2.875F}, {7.75F, 8.125F, 7.5625F});
+    vp::grid grid;
+    grid.extent = glm::ivec3(11);
+    const auto inside = solids::library_solid(box, grid, {}).voxels;
+    const auto is_wall = [&](const glm::ivec3& p) { return inside[solids::index(grid.extent, p.x, p.y, p.z)] != 0; };
+    std::size_t straight = 0, short_parts = 0;
+    for_each_wall_link(box.view(), grid, is_wall, [&](const glm::ivec3& node, int link, float q) {
+        const auto linear = [](float from_wall) { return 0.25F + 0.5F * from_wall; };
+        if (q < 0.5F) {
+            EXPECT_FLOAT_EQ(bounced(q, linear(q), linear(q + 1), 1e9F), linear(1 - q));
+        } else {
+            EXPECT_FLOAT_EQ(bounced(q, linear(1 - q), 1e9F, linear(q + 1)), linear(q));
+        }
+        if (link >= 6) return; // along axes, below: the distance to the face
+        const glm::vec3 centre = glm::vec3(node) + 0.5F, d(vp::link_direction(link));
+        const float face =
+            glm::dot(d, d.x + d.y + d.z > 0 ? glm::vec3(3.25F, 2.625F, 2.875F) : glm::vec3(7.75F, 8.125F, 7.5625F));
+        EXPECT_EQ(q, face - glm::dot(d, centre));
+        ++straight;
+        short_parts += q < 0.5F ? 1 : 0;
+    });
+    EXPECT_EQ(straight, 6u * 5 * 5);
+    EXPECT_GT(short_parts, 20u);
 }
 
 } // namespace

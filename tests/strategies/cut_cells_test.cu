@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Cut cells on the device: the bytes and counters of cpu_backend, for triangles of all sizes, by all axes, of parts of
-// a grid, for bodies and blends.
+// Cut cells and links on the device: the bytes and counters of cpu_backend, for triangles of all sizes, by all axes, of
+// parts of a grid, for bodies and blends.
 #include "device_test.hpp"
 #include "solid_drawings.hpp"
 
 #include <voxelpipe/cells/device/cells.cuh>
+#include <voxelpipe/slabs/stream.hpp>
 
 #include <cpu_ref/cells/voxelize_cells.hpp>
 
@@ -120,6 +121,96 @@ TEST(DeviceCells, MeasuresHaveTheBytesOfTheCpu) {
         expect_same<measured_target>(meshes, axis == 1 ? flat.crop({5, 3, 2}, {19, 14, 20}) : flat,
                                      everything_measured{},
                                      {.bodies = axis == 2 ? vp::bodies::draw : vp::bodies::call, .axis = axis});
+}
+
+// Cones over the holes of each body, or of all together, in parts of a grid too.
+TEST(DeviceCells, ClosedHolesHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{22, 21, 23};
+    mesh_data open = device_test::ball({11, 10, 11}, 7.3f, 7), other = device_test::ball({12, 9, 11}, 5.2f, 6);
+    open.triangles.erase(open.triangles.begin() + 3, open.triangles.begin() + 9);
+    other.triangles.erase(other.triangles.end() - 7);
+    const vp::grid g = device_test::box_grid(extent);
+    for (int axis = 0; axis < 3; ++axis)
+        for (const vp::bodies b : {vp::bodies::call, vp::bodies::draw})
+            expect_same<every_target>({open, other}, axis == 1 ? g.crop({4, 3, 5}, {9, 15, 12}) : g, everything{2},
+                                      {.bodies = b, .axis = axis, .repair = vp::repair::close_holes});
+    expect_same<measured_target>({open, other}, g, everything_measured{},
+                                 {.repair = vp::repair::close_holes, .max_hole_edges = 5});
+}
+
+// Slabs of a stream on the device, with holes that the host closes: the cpu's whole.
+TEST(DeviceCells, SlabsOfAStreamAreTheWhole) {
+    namespace slabs = vp::slabs;
+    const glm::ivec3 extent{14, 17, 15};
+    mesh_data open = device_test::ball({7, 8, 7}, 5.3f, 7);
+    open.triangles.erase(open.triangles.end() - 7, open.triangles.end() - 3);
+    const vp::grid g = device_test::box_grid(extent);
+    const vp::cell_options how{.count_open_edges = false, .repair = vp::repair::close_holes};
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    one_target<vp::cpu_backend> whole(cpu, extent);
+    const vp::status expected = draw(cpu, {open}, g, vp::fraction{}, whole, how);
+    ASSERT_TRUE(expected.ok()) << expected.message();
+    slabs::stream stream(gpu, g, vp::passthrough{}, {.num_slabs = 4, .repair = vp::repair::close_holes});
+    ASSERT_TRUE(stream.add({open.positions, open.triangles}).ok());
+    std::vector<float> found;
+    std::size_t num_slabs = 0;
+    const vp::status s = stream.draw_cells(
+        vp::fraction{},
+        [&](glm::ivec3 e) {
+            return one_target<vp::cuda_backend>{gpu, e};
+        },
+        [&](const slabs::slab&, const one_target<vp::cuda_backend>& part) { // layers along z follow each other
+            const auto values = vp::get<0>(part).to_host(gpu);
+            found.insert(found.end(), values.begin(), values.end());
+            ++num_slabs;
+        },
+        how);
+    ASSERT_TRUE(s.ok()) << s.message();
+    EXPECT_EQ(num_slabs, 4u);
+    EXPECT_EQ(s.counts, expected.counts);
+    EXPECT_TRUE(s.cells == expected.cells);
+    EXPECT_GT(s.cells.cones, 0u);
+    device_test::expect_same_bytes(vp::get<0>(whole).to_host(cpu), found, "slabs");
+}
+
+// The lists of both backends, record by record. Returns the number of crossed links.
+static std::uint64_t expect_same_links(const std::vector<mesh_data>& meshes, const vp::grid& g, int neighbours) {
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    vp::link_list<vp::cpu_backend> a(cpu);
+    vp::link_list<vp::cuda_backend> b(gpu);
+    const auto run = [&](auto& backend, auto& list) {
+        using backend_type = std::remove_reference_t<decltype(backend)>;
+        std::vector<vp::mesh<backend_type>> on_backend;
+        for (const mesh_data& m : meshes) on_backend.emplace_back(backend, m.positions, m.triangles);
+        std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, vp::none>> draws;
+        for (const auto& m : on_backend) draws.push_back({m.view(), {}, {}});
+        return vp::voxelize_links(backend, draws, g, list, {.neighbours = neighbours});
+    };
+    const vp::status expected = run(cpu, a), found = run(gpu, b);
+    EXPECT_TRUE(expected.ok()) << expected.message();
+    EXPECT_TRUE(found.ok()) << found.message();
+    EXPECT_EQ(expected.counts, found.counts);
+    EXPECT_EQ(a.neighbours, b.neighbours);
+    device_test::expect_same_bytes(a.voxels.to_host(cpu), b.voxels.to_host(gpu), "voxels");
+    device_test::expect_same_bytes(a.q.to_host(cpu), b.q.to_host(gpu), "q");
+    device_test::expect_same_bytes(a.primitives.to_host(cpu), b.primitives.to_host(gpu), "primitives");
+    device_test::expect_same_bytes(a.draws.to_host(cpu), b.draws.to_host(gpu), "draws");
+    return expected.counts.fragments;
+}
+
+TEST(DeviceLinks, HaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{25, 21, 24};
+    mesh_data m = device_test::mixed_triangles(120, 22, 5);
+    device_test::append(m, device_test::long_triangles(extent, 8, 3));
+    const std::vector<mesh_data> meshes{m, device_test::tied_bodies(20, 8, 2), device_test::ball({12, 9, 11}, 6.3f, 7)};
+    vp::grid flat = device_test::box_grid(extent);
+    flat.voxel_size = {0.5f, 1.25f, 0.75f};
+    EXPECT_GT(expect_same_links(meshes, device_test::box_grid(extent), 26), 5000u);
+    EXPECT_GT(expect_same_links(meshes, flat, 18), 1000u);
+    EXPECT_GT(expect_same_links(meshes, flat.crop({5, 3, 2}, {17, 14, 19}), 26), 1000u);
+    EXPECT_EQ(expect_same_links({}, flat, 18), 0u);
 }
 
 TEST(DeviceCells, NothingAndBadIndices) {

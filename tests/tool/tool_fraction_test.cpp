@@ -222,6 +222,39 @@ TEST(Fraction, OverlapsAddUpAndClampKeepsOne) {
     expect_same(expected, read_npy(folder / "clamped.npy"));
 }
 
+// The lid on a box without a side is the side: the closed box's values, without a warning, beside a solid too.
+TEST(Fraction, HolesAreClosed) {
+    const scratch_folder folder;
+    const glm::vec3 low(-2.125F, -1.75F, -3), high(1.625F, 2.0625F, 0.25F);
+    const shape whole = box(low, high);
+    shape open = whole;
+    open.triangles.resize(10); // without the side at the greatest x
+    builder file;
+    add(file, open);
+    const std::vector<float> expected = library_fractions({whole}, grid_of_16());
+    const auto values = [&](const std::vector<std::string>& arguments, outcome& result) {
+        result = draw(folder, file, "o.npy", arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+        return read_npy(folder / (arguments[1] == "fraction" ? "o.npy" : "o.fraction.npy"));
+    };
+    outcome result;
+    const array closed = values({"-t", "fraction", "--close-holes", "--stats", "json"}, result);
+    EXPECT_EQ(std::string::npos, result.err.find("not closed")) << result.err;
+    for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(expected[i], closed.at<float>(i), 1e-7) << i;
+    json counts = json::parse(result.out)["fractions"];
+    EXPECT_EQ((std::vector{4, 1, 1, 0, 0}),
+              (std::vector<int>{counts["hole_edges"], counts["holes"], counts["closed_holes"], counts["open_edges"],
+                                counts["open_rows"]}));
+    const array beside =
+        values({"-t", "fraction,occupancy", "--solid", "nonzero", "--close-holes=4", "--stats", "json"}, result);
+    for (std::size_t i = 0; i < expected.size(); ++i) ASSERT_EQ(closed.at<float>(i), beside.at<float>(i)) << i;
+    EXPECT_EQ(1, json::parse(result.out)["solid"]["closed_holes"].get<int>());
+    // Too large a hole: the open box's values, with the warning.
+    const array left = values({"-t", "fraction", "--close-holes=3"}, result);
+    EXPECT_NE(std::string::npos, result.err.find("not closed")) << result.err;
+    expect_same(library_fractions({open}, grid_of_16()), left);
+}
+
 TEST(Fraction, OpenModelsAndLinesAreNamed) {
     const scratch_folder folder;
     builder file;
@@ -328,7 +361,9 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
         refused({"-t", "fraction", "--solid", rule}, "--solid " + rule + " and --target fraction do not go together");
     refused({"-t", "fraction", "--solid", "nonzero", "--vote"}, "--vote and --target fraction");
     refused({"-t", "fraction", "--solid", "nonzero", "--winding"}, "--winding and --target fraction");
-    refused({"-t", "fraction", "--solid", "nonzero", "--close-holes"}, "--close-holes and --target fraction");
+    refused({"--close-holes"}, "--close-holes goes with --solid, or with --target fraction");
+    refused({"-t", "fraction", "--close-holes=0"}, "--close-holes takes the number of edges");
+    refused({"-t", "fraction", "--solid", "nonzero", "--close-holes=few"}, "--close-holes takes the number of edges");
     refused({"-t", "fraction", "--coverage", "thin"}, "--coverage and --target fraction");
     refused({"-t", "fraction", "--alpha", "cutoff"}, "--alpha cutoff and --target fraction");
     refused({"-t", "fraction", "--sparse"}, "--sparse and --target fraction");

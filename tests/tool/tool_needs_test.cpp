@@ -112,7 +112,7 @@ struct needs {
 #ifdef VOXELPIPE_ALL_NEEDS // a program of its own, which takes minutes
 const std::vector<std::string> all_targets{"occupancy", "color", "normal", "count", "color,normal,count"};
 constexpr int dense_resolution = 144, sparse_resolution = 320;
-const std::vector<double> multiples{0.78, 1.0, 1.5, 2.0};
+const std::vector<double> multiples{0.75, 1.0, 1.5, 2.0};
 #else
 const std::vector<std::string> all_targets{"color,normal,count"};
 constexpr int dense_resolution = 112, sparse_resolution = 200;

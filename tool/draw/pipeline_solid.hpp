@@ -265,6 +265,10 @@ void pipeline<Backend>::draw_cells(volume& result) {
         scratch.empty() ? channel_at<float>(result, info_of(target::fraction).name, 0) : scratch.data();
     const auto view = vp::framebuffer_view<vp::target<float, vp::blend::replace>>::on(extent, values);
     vp::cell_options options;
+    if (request_.close_holes != 0) {
+        options.repair = vp::repair::close_holes;
+        options.max_hole_edges = request_.close_holes;
+    }
     const auto draw_by = [&](const auto& of_voxels) {
         using draw = vp::draw<vp::mesh_view<>, instanced_vertex_shader, std::remove_cvref_t<decltype(of_voxels)>>;
         std::vector<draw> draws;
@@ -306,6 +310,9 @@ void pipeline<Backend>::draw_cells(volume& result) {
     counts.below_zero = status.cells.below_zero;
     counts.above_one = status.cells.above_one;
     counts.open_edges = status.cells.open_edges;
+    counts.hole_edges = status.cells.hole_edges;
+    counts.holes = status.cells.holes;
+    counts.closed_holes = status.cells.cones;
     stats_.fractions = counts;
     for (std::string& warning : fraction_warnings(counts, request_.clamp || !wants(target::fraction)))
         stats_.warnings.push_back(std::move(warning));

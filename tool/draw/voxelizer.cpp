@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <new>
 #include <optional>
 #include <span>
@@ -49,17 +50,18 @@ scene_bytes bytes_of(const scene& model, const voxelize_request& request) {
 }
 
 // Bytes of drawing cut cells beside the result, after the other targets: snapped vertices and triangles; and the edges
-// that are sorted, or the pairs of a triangle and a voxel that meet, of a surface somewhat larger than that of the
-// grid. Other values alone are drawn beside fractions that nobody keeps.
+// that are sorted, or those of holes, or the pairs of a triangle and a voxel that meet, of a surface somewhat larger
+// than that of the grid. Other values alone are drawn beside fractions that nobody keeps.
 double fraction_bytes(const voxelize_request& request, double vertices, double triangles) {
     if (!request.wants_cells()) return 0;
     const glm::dvec3 n(request.grid.extent);
     constexpr double triangle_bytes = 36, edges_bytes = 72;
     const double pair_bytes = request.wants(target::area) || request.wants(target::centroid) ? 128 : 56;
     const double pairs = 2 * triangles + 2.5 * (n.x * n.y + n.y * n.z + n.z * n.x);
+    const double holes = request.close_holes != 0 ? 40 * vertices + 36 * triangles : 0; // on the host
     const double scratch = request.wants(target::fraction) ? 0 : sizeof(float) * n.x * n.y * n.z;
     return scratch + sizeof(vp::core::snapped_position) * vertices + triangle_bytes * triangles +
-           std::max(edges_bytes * triangles, pair_bytes * pairs);
+           std::max({edges_bytes * triangles, pair_bytes * pairs, holes});
 }
 double fraction_bytes(const scene& model, const voxelize_request& request) {
     return fraction_bytes(request, static_cast<double>(model.vertex_count()),
@@ -141,12 +143,44 @@ double drawn_bytes(std::span<const target> targets) {
     return bytes;
 }
 
-// An estimate of what writers of bricks find in a dense result: a surface as large as that of the grid.
-double written_bytes(const voxelize_request& request) {
+// Voxels of the grid's own surface: an estimate for a model that is not known.
+double surface_voxels(const voxelize_request& request) {
+    const glm::dvec3 n(request.grid.extent);
+    return 2 * (n.x * n.y + n.y * n.z + n.z * n.x);
+}
+
+// The voxels of a model, where they are fewer. A plane touches |x| + |y| + |z| voxels for each of its area, (x, y, z)
+// being its normal; triangles that lie apart touch one each at least.
+double surface_voxels(const scene& model, const voxelize_request& request) {
+    const double of_grid = surface_voxels(request);
+    if (!request.write_bytes) return of_grid;
+    const auto apart = static_cast<double>(model.triangle_count() + model.line_count());
+    if (apart >= of_grid) return of_grid;
+    constexpr double margin = 1.05;
+    double voxels = 0;
+    for (const instance& shown : model.instances) {
+        const primitive& drawn = model.primitives[shown.primitive];
+        const auto at = [&](std::uint32_t vertex) {
+            return shown.to_world(drawn.positions[vertex]) / glm::dvec3(request.grid.voxel_size);
+        };
+        for (const glm::uvec3& t : drawn.triangles) {
+            const glm::dvec3 a = at(t.x), twice = glm::cross(at(t.y) - a, at(t.z) - a);
+            voxels += margin / 2 * (std::abs(twice.x) + std::abs(twice.y) + std::abs(twice.z));
+        }
+        for (const glm::uvec2& l : drawn.lines) {
+            const glm::dvec3 along = glm::abs(at(l.y) - at(l.x));
+            voxels += along.x + along.y + along.z;
+        }
+    }
+    return std::min(of_grid, std::max(voxels, apart));
+}
+
+// An estimate of what writers of bricks find in a dense result, given the voxels of the surface.
+double written_bytes(const voxelize_request& request, double voxels) {
     if (!request.write_bytes) return 0;
     const glm::dvec3 n(request.grid.extent);
     constexpr double brick_area = 64, brick_voxels = 512;
-    const double voxels = 2 * (n.x * n.y + n.y * n.z + n.z * n.x), all = n.x * n.y * n.z;
+    const double all = n.x * n.y * n.z;
     if (request.solid) return request.write_bytes(all / brick_voxels, all, 0);
     return request.write_bytes(std::min(voxels / brick_area, all / brick_voxels), std::min(voxels, all), 0);
 }
@@ -252,8 +286,10 @@ volume with_ring(volume inside, const voxelize_request& request) {
 
 namespace {
 
-// Bytes beyond those of the model's vertices and triangles: `parts` are those, `fractions` with those of fractions.
-double dense_need_beside(const voxelize_request& request, double parts, double fractions, const fill_bytes& fill) {
+// Bytes beyond those of the model's vertices and triangles: `parts` are those, `fractions` with those of fractions,
+// `written` those of writing.
+double dense_need_beside(const voxelize_request& request, double parts, double fractions, const fill_bytes& fill,
+                         double written) {
     const auto [volume, ring, bits] = result_of(request);
     // A slab of one layer, and each thread's tile with its sums.
     constexpr double least_work = 1 << 20, thread_bytes = 1 << 20, tile_voxels = 32768, sums = 2.5;
@@ -262,7 +298,7 @@ double dense_need_beside(const voxelize_request& request, double parts, double f
     const double layer = voxel * request.grid.extent.x * request.grid.extent.y;
     const double drawn = fill.held + bits +
                          std::max({parts + least_work + layer + threads, fractions, least_work + layer + fill.filling});
-    return std::max(fill.made, volume + std::max({ring, drawn, written_bytes(request)}));
+    return std::max(fill.made, volume + std::max({ring, drawn, written}));
 }
 
 } // namespace
@@ -270,11 +306,13 @@ double dense_need_beside(const voxelize_request& request, double parts, double f
 double dense_need(const scene& model, const voxelize_request& request) {
     const scene_bytes parts = bytes_of(model, request);
     return dense_need_beside(request, parts.vertices + parts.varyings + parts.triangles + parts.lines,
-                             fraction_bytes(model, request), fill_bytes_of(model, request));
+                             fraction_bytes(model, request), fill_bytes_of(model, request),
+                             written_bytes(request, surface_voxels(model, request)));
 }
 
 double dense_need(const voxelize_request& request) {
-    return dense_need_beside(request, 0, fraction_bytes(request, 0, 0), fill_bytes_of(request, 0, 0));
+    return dense_need_beside(request, 0, fraction_bytes(request, 0, 0), fill_bytes_of(request, 0, 0),
+                             written_bytes(request, surface_voxels(request)));
 }
 
 void require_vertices(const scene& model, const voxelize_request& request, double result) {

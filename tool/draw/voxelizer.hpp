@@ -54,6 +54,7 @@ struct voxelize_request {
     std::vector<target> targets{target::occupancy}; // channels of the volume, in this order, none twice
     int depth_axis = 2;                             // 0 x, 1 y, 2 z
     bool clamp = false;                             // fractions to 0..1
+    std::uint64_t close_holes = 0; // before cells are measured, holes of up to this number of edges; 0: no holes
     blend_alpha alpha = blend_alpha::weight;
     backend_choice backend = backend_choice::automatic;
     voxelpipe::strategy strategy = voxelpipe::strategy::automatic; // on a GPU
@@ -103,7 +104,8 @@ struct fraction_counts {
     std::uint64_t above_one = 0;  // above 1 + 2^-24
     std::uint64_t rows = 0;       // rows of voxels along x, and for area vectors along y and z too
     std::uint64_t open_rows = 0;  // rows whose triangles do not balance
-    std::uint64_t open_edges = 0; // edges of the snapped model that no opposite edge cancels
+    std::uint64_t open_edges = 0; // edges of the snapped model, lids included, that no opposite edge cancels
+    std::uint64_t hole_edges = 0, holes = 0, closed_holes = 0; // with close_holes
 };
 
 struct voxelize_stats {

@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "memory.hpp"
 
+#if !defined(__wasi__)
 #include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
+#endif
 
 #include <algorithm>
 #include <atomic>
@@ -32,6 +34,16 @@ struct residence {
     std::uint64_t all = 0, of_files = 0; // of_files: code and mapped files
 };
 
+#if defined(__wasi__)
+// WebAssembly's memory grows and never shrinks: what it holds is not what is taken. Data and the stack lie below the
+// heap. Of the heap only counted blocks are known.
+extern "C" const char __heap_base;
+residence residence_now() noexcept {
+    const std::uint64_t below_heap = reinterpret_cast<std::uintptr_t>(&__heap_base);
+    return {below_heap + counted, 0};
+}
+std::uint64_t heap_bytes() noexcept { return 0; }
+#else
 // Takes no counted block: it is called within operator new.
 residence residence_now() noexcept {
     std::FILE* const file = std::fopen("/proc/self/statm", "r");
@@ -52,6 +64,7 @@ std::uint64_t heap_bytes() noexcept {
     return mallinfo2().arena;
 #endif
 }
+#endif
 
 std::uint64_t difference(std::uint64_t a, std::uint64_t b) { return a > b ? a - b : 0; }
 
@@ -72,12 +85,14 @@ void measure_overhead() noexcept {
     if (limit_bytes != UINT64_MAX) allowed = difference(limit_bytes, rest + reserve);
 }
 
+#if !defined(__wasi__)
 // The number in FILE; the greatest number if FILE holds none ("max").
 std::uint64_t number_in(const std::string& file) {
     std::ifstream stream(file);
     std::uint64_t number = 0;
     return stream >> number ? number : UINT64_MAX;
 }
+#endif
 
 std::string limit_text() {
     return mebibytes(static_cast<double>(limit_bytes)) +
@@ -94,6 +109,13 @@ std::string with(const std::string& hint) { return hint.empty() ? hint : ": " + 
 
 } // namespace
 
+#if defined(__wasi__)
+// Addresses have 32 bits. A browser may give less, which malloc then says.
+std::uint64_t machine_limit() {
+    constexpr std::uint64_t addressed = std::uint64_t{1} << 32;
+    return addressed - addressed / 10;
+}
+#else
 std::uint64_t machine_limit() {
     std::uint64_t least =
         static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
@@ -115,6 +137,7 @@ std::uint64_t machine_limit() {
     }
     return least - least / 10;
 }
+#endif
 
 void set_limit(std::uint64_t limit, bool is_option) {
     limit_bytes = limit != 0 ? limit : machine_limit();
@@ -126,6 +149,9 @@ std::uint64_t limit() { return limit_bytes; }
 
 std::uint64_t resident() { return residence_now().all; }
 
+#if defined(__wasi__)
+std::uint64_t peak() { return std::uint64_t{__builtin_wasm_memory_size(0)} * 65536; }
+#else
 std::uint64_t peak() {
     std::ifstream status("/proc/self/status");
     for (std::string line; std::getline(status, line);)
@@ -134,6 +160,7 @@ std::uint64_t peak() {
     getrusage(RUSAGE_SELF, &usage);
     return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
 }
+#endif
 
 std::uint64_t room() {
     measure_overhead();

@@ -4,6 +4,36 @@
 
 #include "read/gltf/text.hpp"
 
+#include <new>
+#include <span>
+
+#if defined(__wasi__)
+
+namespace voxelize {
+
+// WASI has one process. What would end another one ends this one, and the page starts it anew for each model: it is the
+// boundary there, so the time and the memory of the work have no limit of their own.
+std::vector<std::byte> run_isolated(const std::function<std::vector<std::byte>()>& work, const isolation_limits& limits,
+                                    const std::string& who) {
+    std::vector<std::byte> bytes;
+    try {
+        bytes = work();
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& error) {
+        const std::string text = gltf::printable(error.what(), 200);
+        throw model_error(who + ": " + (text.empty() ? "the file cannot be read" : text));
+    }
+    if (bytes.size() > limits.result)
+        throw model_error(who + ": the model takes more than the " + std::to_string(limits.result >> 20) +
+                          " MiB that a file of this size gets");
+    return bytes;
+}
+
+} // namespace voxelize
+
+#else
+
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define VOXELIZE_IS_SANITIZED
 #elif defined(__has_feature)
@@ -26,8 +56,6 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
-#include <new>
-#include <span>
 
 namespace voxelize {
 
@@ -181,3 +209,5 @@ std::vector<std::byte> run_isolated(const std::function<std::vector<std::byte>()
 }
 
 } // namespace voxelize
+
+#endif

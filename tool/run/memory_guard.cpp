@@ -60,8 +60,10 @@ void release(void* block) noexcept {
 // malloc keeps the memory of blocks below its threshold, and raises that as it goes. Fixed at the least counted block:
 // what is counted is gone once it is given back, and only small blocks stay. The system grants a process some 65
 // thousand mappings, of which the rest of it needs a few.
+#if !defined(__wasi__) // whose malloc has no mappings
 [[maybe_unused]] const int fixed_threshold = mallopt(M_MMAP_THRESHOLD, voxelize::memory::counted_block);
 [[maybe_unused]] const int most_mappings = mallopt(M_MMAP_MAX, 1 << 15);
+#endif
 
 } // namespace
 

@@ -132,6 +132,9 @@ void print_text(std::ostream& stream, const run_report& report) {
                           << counts->below_zero << " below 0, " << counts->above_one << " above 1, "
                           << counts->open_rows << " of " << counts->rows << " rows open, " << counts->open_edges
                           << " open edges\n";
+    if (const auto& counts = report.stats.fractions; counts && counts->holes != 0 && !report.request.solid)
+        line("holes") << counts->closed_holes << " of " << counts->holes << " closed, of " << counts->hole_edges
+                      << " edges in all\n";
     if (report.stats.normals_cancelled != 0) line("normals cancelled") << report.stats.normals_cancelled << '\n';
     stream << std::fixed << std::setprecision(1);
     for (const auto& [stage, time] : report.stats.milliseconds)
@@ -213,6 +216,11 @@ void print_json(std::ostream& stream, const run_report& report) {
                              {"rows", counts->rows},
                              {"open_rows", counts->open_rows},
                              {"open_edges", counts->open_edges}};
+    if (const auto& counts = report.stats.fractions; counts && report.request.close_holes != 0) {
+        root["fractions"]["hole_edges"] = counts->hole_edges;
+        root["fractions"]["holes"] = counts->holes;
+        root["fractions"]["closed_holes"] = counts->closed_holes;
+    }
     root["targets"] = json::array();
     for (const target id : report.request.targets)
         if (!report.request.remesh) root["targets"].push_back(info_of(id).name);

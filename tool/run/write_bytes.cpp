@@ -35,7 +35,7 @@ value_bytes bytes_of_values(std::span<const target> targets) {
 
 // Two sides of each voxel of a surface: lists of faces, then quads and vertices.
 double bytes_of_mesh(const expected_result& result, double voxels, double threads) {
-    constexpr double of_voxel = 175, of_corner = 4;
+    constexpr double of_voxel = 190, of_corner = 4;
     return of_voxel * voxels + threads * of_corner * result.extent.x * result.extent.y;
 }
 
@@ -43,11 +43,11 @@ double bytes_of_mesh(const expected_result& result, double voxels, double thread
 // written.
 double bytes_of_hexahedra(const std::string& extension, const expected_result& result, double bricks, double voxels,
                           double threads) {
-    constexpr double of_brick = 24, of_part = 64, rows_of_part = 8, parts_of_thread = 5, least_voxels_of_part = 32768;
+    constexpr double of_brick = 24, of_part = 64, rows_of_part = 8, parts_of_thread = 5, least_voxels_of_part = 4096;
     const double parts = std::min(1.0 * result.extent.z * result.extent.y / rows_of_part, double{1 << 22});
     const double waiting =
         std::min(voxels, threads * parts_of_thread * std::max(least_voxels_of_part, rows_of_part * result.extent.x));
-    constexpr double of_line = 200, of_element = 150, of_corners = 60; // in strings that grow, but for .vtu
+    constexpr double of_line = 200, of_element = 150, of_corners = 40; // in strings that grow, but for .vtu
     const double of_voxel = extension == ".inp" ? of_line : extension == ".msh" ? of_element : of_corners;
     return of_brick * bricks + of_part * parts + of_voxel * waiting;
 }
@@ -93,7 +93,7 @@ double bytes_to_write(const std::filesystem::path& output, const expected_result
     if (is_one_of(extension, {".npz", ".vti", ".pvti", ".nrrd", ".schem", ".litematic", ".3mf", ".html", ".vtu"}))
         bytes += threads * bytes_of_thread;
     // Blocks of .vtu are gathered for all threads, in memory that grows.
-    if (extension == ".vtu") bytes += std::min(threads * 2 * bytes_of_thread, 64 * voxels);
+    if (extension == ".vtu") bytes += std::min(threads * bytes_of_thread, 64 * voxels);
     if (extension == ".zarr") {
         constexpr double chunk_voxels = 64 * 64 * 64, copies = 2.3; // as it is, and with room for what it becomes
         bytes += threads * (bytes_of_thread / 2 + copies * chunk_voxels * values.largest);
@@ -119,7 +119,7 @@ double bytes_to_write(const std::filesystem::path& output, const expected_result
     }
     if (is_one_of(extension, {".glb", ".obj", ".stl", ".3mf"}) || (extension == ".ply" && !options.points))
         bytes += bytes_of_mesh(result, voxels, threads);
-    constexpr double items_at_once = 4 * 32768; // formatted by each thread
+    constexpr double items_at_once = 4 * 8192; // formatted by each thread
     if (extension == ".obj") bytes += of_line_of_mesh * std::min(2 * voxels, threads * items_at_once);
     if (extension == ".stl") {
         bytes += of_triangle_of_stl * std::min(4 * voxels, threads * items_at_once);

@@ -13,6 +13,7 @@
 #include <glm/vec3.hpp>
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <type_traits>
 
@@ -26,6 +27,13 @@ struct cell_options {
     int axis = 0;
     bool count_voxels = true;     // fill counters::voxels
     bool count_open_edges = true; // fill cell_counters::open_edges, which sorts all edges
+    // repair::none, or repair::close_holes, which first puts a cone over each hole of each body, as for solids. Cones
+    // are triangles of the mesh then: they cut voxels and have areas. Takes host memory for all triangles and vertices.
+    voxelpipe::repair repair = voxelpipe::repair::none;
+    std::uint64_t max_hole_edges = std::numeric_limits<std::uint64_t>::max(); // holes with more edges stay open
+    // close_holes of a part of a mesh: the cones of each body of the whole one, in host memory, in units of the whole
+    // grid, as solid_options::cones. Null: they are found.
+    const core::hole_cones* cones = nullptr;
 };
 
 // One voxel of one body: what a cell's shader gets. Units are u = 2^-44 of the voxel, or of its face.
@@ -143,7 +151,8 @@ template <class Mesh, class VertexShader, class CellShader, class... Targets>
 }
 
 [[nodiscard]] inline status validate(const cell_options& o) {
-    const bool known = o.bodies <= bodies::draw && o.axis >= 0 && o.axis <= 2;
+    const bool repairs = o.repair == repair::none || o.repair == repair::close_holes;
+    const bool known = o.bodies <= bodies::draw && o.axis >= 0 && o.axis <= 2 && repairs;
     return known ? status{} : failure(status_code::bad_cell_options);
 }
 
@@ -156,6 +165,7 @@ template <class Mesh, class VertexShader, class CellShader, class... Targets>
 // bodies::call, each draw's own with bodies::draw. On a closed mesh a voxel that no triangle touches has its integer
 // exactly, and the sum of all is the mesh's volume up to roundings of 2^-44. An open mesh is defined by rows along the
 // axis, from the low end. Triangles count as outside iff they miss the grid's intervals along the two other axes.
+// repair::close_holes closes the mesh first, by all its triangles, so that a crop is the crop of the whole then too.
 // Without any triangles it clears, as vp::clear does. Returns after the work is done. Fails with winding_too_large, and
 // writes nothing, where 2^19 triangles or more could wrap the sums of a row. A cell's shader that needs centroids or
 // areas names them (measured_cell).

@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <exception>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <new>
@@ -62,12 +64,20 @@ void parallel_for(unsigned num_threads, std::size_t num_items, const Work& work)
     parallel_items(num_threads, num_items, call, &work);
 }
 
+// A number of elements as memory counts them. Throws std::bad_alloc where that is too many for an address: a
+// std::size_t may have 32 bits.
+[[nodiscard]] inline std::size_t length_of(std::uint64_t count) {
+    if (count > std::numeric_limits<std::size_t>::max()) throw std::bad_alloc();
+    return static_cast<std::size_t>(count);
+}
+
 // A fixed number of uninitialised values. Several threads write all of them before they are read.
 template <class T>
 class raw_array {
 public:
     raw_array() = default;
-    explicit raw_array(std::size_t size) : data_(std::make_unique_for_overwrite<T[]>(size)), size_(size) {}
+    explicit raw_array(std::uint64_t size)
+        : data_(std::make_unique_for_overwrite<T[]>(length_of(size))), size_(length_of(size)) {}
 
     [[nodiscard]] T* data() { return data_.get(); }
     [[nodiscard]] const T* data() const { return data_.get(); }

@@ -11,8 +11,8 @@
 #include <cmath>
 #include <cstdint>
 
-// MinGW's functions round twice.
-#if defined(__MINGW32__) && !defined(__FMA__)
+// MinGW's functions round twice; WebAssembly has no instruction, and a function of its C library's choice.
+#if (defined(__MINGW32__) && !defined(__FMA__)) || defined(__wasm__)
 #define VOXELPIPE_SOFTWARE_FMA
 #endif
 

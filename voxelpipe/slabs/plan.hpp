@@ -292,6 +292,16 @@ inline void add_drawn(status& all, const status& one) {
     all.solid.open_rows += one.solid.open_rows;
     all.solid.crossings += one.solid.crossings;
     all.solid.max_winding = std::max(all.solid.max_winding, one.solid.max_winding);
+    cell_counters& c = all.cells;
+    const std::uint64_t low = c.volume_low + one.cells.volume_low;
+    c.volume_high += one.cells.volume_high + (low < c.volume_low ? 1 : 0);
+    c.volume_low = low;
+    c.cut_voxels += one.cells.cut_voxels;
+    c.below_zero += one.cells.below_zero;
+    c.above_one += one.cells.above_one;
+    c.open_rows += one.cells.open_rows;
+    c.cell_records += one.cells.cell_records;
+    c.lost_centroids += one.cells.lost_centroids;
 }
 
 // The items [first, second) of `count` that one of several ranks or devices reads: contiguous, ascending with the rank,

@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The records of a slab as the arrays of a mesh in host memory.
+// The records of a slab as the arrays of a mesh in host memory, and what is known of that into which a slab is drawn.
 
+#include <voxelpipe/abuffer.hpp>
 #include <voxelpipe/core/threads.hpp>
+#include <voxelpipe/framebuffer.hpp>
 #include <voxelpipe/slabs/bins.hpp>
 #include <voxelpipe/slabs/records.hpp>
 
@@ -20,6 +22,24 @@
 #include <vector>
 
 namespace voxelpipe::slabs::detail {
+
+// Bytes of a voxel in what a call draws into; 0 if that depends on the mesh.
+template <class Output>
+inline constexpr double bytes_per_voxel = 0;
+template <class... Targets>
+inline constexpr double bytes_per_voxel<framebuffer_view<Targets...>> =
+    ((std::is_same_v<typename Targets::map::element, std::uint32_t> && Targets::map::is_bit
+          ? 0.125
+          : static_cast<double>(sizeof(typename Targets::value_type))) +
+     ...);
+template <class Backend, class... Targets>
+inline constexpr double bytes_per_voxel<framebuffer<Backend, Targets...>> =
+    bytes_per_voxel<framebuffer_view<Targets...>>;
+
+template <class Output>
+inline constexpr bool is_abuffer = false;
+template <class Backend, class Payload>
+inline constexpr bool is_abuffer<abuffer<Backend, Payload>> = true;
 
 // Three vertices a triangle.
 template <class Varyings>

@@ -14,6 +14,7 @@
 // triangles and more); vertex::index counts in the chunk. The fragment shader
 // sees what it sees in the whole call: triangle and primitive are numbers in the whole mesh.
 
+#include <voxelpipe/cells/cells.hpp>
 #include <voxelpipe/slabs/bins.hpp>
 #include <voxelpipe/slabs/plan.hpp>
 #include <voxelpipe/slabs/records.hpp>
@@ -47,28 +48,6 @@ struct slab {
     // offsets at which this one's lists begin.
     std::uint64_t voxels_before = 0, fragments_before = 0;
 };
-
-namespace detail {
-
-// Bytes of a voxel in what a call draws into; 0 if that depends on the mesh.
-template <class Output>
-inline constexpr double bytes_per_voxel = 0;
-template <class... Targets>
-inline constexpr double bytes_per_voxel<framebuffer_view<Targets...>> =
-    ((std::is_same_v<typename Targets::map::element, std::uint32_t> && Targets::map::is_bit
-          ? 0.125
-          : static_cast<double>(sizeof(typename Targets::value_type))) +
-     ...);
-template <class Backend, class... Targets>
-inline constexpr double bytes_per_voxel<framebuffer<Backend, Targets...>> =
-    bytes_per_voxel<framebuffer_view<Targets...>>;
-
-template <class Output>
-inline constexpr bool is_abuffer = false;
-template <class Backend, class Payload>
-inline constexpr bool is_abuffer<abuffer<Backend, Payload>> = true;
-
-} // namespace detail
 
 // Varyings: those of the vertex shader. The stream refers to the backend. A stream is drawn once.
 template <class Backend, class Varyings>
@@ -144,8 +123,10 @@ public:
     template <class FragmentShader, class Make, class Sink>
     [[nodiscard]] status draw(const FragmentShader& shader, const Make& make, const Sink& sink) {
         if (options_.is_solid) return core::failure(status_code::bad_solid_options);
-        return with_sink(sink,
-                         [&](const auto& to) { return draw_slabs<false>(shader, make, to, solid_options{}, 0.75); });
+        const auto call = [&](const auto& draws, const grid& g, auto& out) {
+            return voxelize(backend_, draws, g, out, options_.voxelize);
+        };
+        return with_sink(sink, [&](const auto& to) { return draw_slabs<false>(shader, make, to, 0.75, call); });
     }
     // Draws solids: the voxels, the counts and the counts of rows of one call with the whole mesh, which is one draw.
     // Slabs are along y or z, with vote and exterior along z. how.repair is that of stream_options; how.cones and
@@ -169,7 +150,38 @@ public:
         return with_sink(sink, [&](const auto& to) {
             if (!has_walls_)
                 if (const status s = repairs_.begin(how); !s.ok()) return s;
-            return draw_slabs<true>(shader, make, to, how, repairs_.needs_walls() ? share_beside_flood : 0.75);
+            const auto call = [&](const auto& draws, const grid& g, auto& out) {
+                return voxelize_solid(backend_, draws, g, out, repairs_.of(g, how));
+            };
+            return draw_slabs<true>(shader, make, to, repairs_.needs_walls() ? share_beside_flood : 0.75, call);
+        });
+    }
+    // Draws cut cells: the fractions, and the counts but for open_edges, of one voxelize_cells with the whole mesh,
+    // which is one draw. The stream is made for solids (stream_options::is_solid), with how.repair as its repair;
+    // make gives framebuffers. Rows run along x (how.axis is 0), and slabs are along y or z. how.cones are found by
+    // the stream, and not given. Memory beyond the targets, which the budget does not count: as for voxelize_cells, of
+    // a slab's triangles. bad_cell_options: another stream or option.
+    template <class CellShader, class Make, class Sink>
+    [[nodiscard]] status draw_cells(const CellShader& shader, const Make& make, const Sink& sink,
+                                    const cell_options& how = {}) {
+        if (const status s = core::validate(how); !s.ok()) return s;
+        if (!options_.is_solid || how.repair != options_.repair || how.cones != nullptr || how.axis != 0 || axis_ == 0)
+            return core::failure(status_code::bad_cell_options);
+        return with_sink(sink, [&](const auto& to) {
+            solid_options holes;
+            holes.repair = how.repair;
+            holes.max_hole_edges = how.max_hole_edges;
+            if (const status s = repairs_.begin(holes); !s.ok()) return s;
+            status all = draw_slabs<true>(shader, make, to, 0.75, [&](const auto& draws, const grid& g, auto& out) {
+                cell_options of_slab = how;
+                of_slab.count_open_edges = false; // a slab has some of the triangles
+                of_slab.cones = repairs_.of(g, holes).cones;
+                return voxelize_cells(backend_, draws, g, out, of_slab);
+            });
+            all.cells.hole_edges = std::exchange(all.solid.hole_edges, 0);
+            all.cells.holes = std::exchange(all.solid.holes, 0);
+            all.cells.cones = std::exchange(all.solid.cones, 0);
+            return all;
         });
     }
 
@@ -206,10 +218,10 @@ private:
         return result;
     }
 
-    // share: of the memory, that a slab may take.
-    template <bool IsSolid, class Shader, class Make, class Sink>
-    [[nodiscard]] status draw_slabs(const Shader& shader, const Make& make, const Sink& sink, const solid_options& how,
-                                    double share) {
+    // share: of the memory, that a slab may take. call(draws, grid, output) draws a slab.
+    template <bool IsSolid, class Shader, class Make, class Sink, class Call>
+    [[nodiscard]] status draw_slabs(const Shader& shader, const Make& make, const Sink& sink, double share,
+                                    const Call& call) {
         using output = std::remove_cvref_t<decltype(make(grid_.extent))>;
         constexpr bool lists = detail::is_abuffer<output>;
         if (lists && axis_ != 2) return core::failure(status_code::bad_crop);
@@ -221,37 +233,28 @@ private:
             }
         status all;
         const double voxel = detail::bytes_per_voxel<output> + repairs_.voxel_bytes();
-        const status s = queue_.for_each(
-            detail::costs_of<Varyings>(options_, voxel, share), false,
-            [&](const typename queue_type::entry& next, arrays triangles) {
-                slab part;
-                part.where = next.where;
-                part.voxels_before = all.counts.voxels;
-                part.fragments_before = all.counts.fragments;
-                output out = make(part.where.extent);
-                if constexpr (IsSolid) {
-                    repairs_.enter(next.where, next.triangles);
-                    if (triangles.numbers.size() == 0 && repairs_.fills_without_triangles())
-                        triangles = arrays::dropped();
-                    const solid_options of_slab = repairs_.of(part.where, how);
-                    part.drawn = draw_one<true>(std::move(triangles), shader, part.where, out,
-                                                [&](const auto& draws, const grid& g, auto& to) {
-                                                    return voxelize_solid(backend_, draws, g, to, of_slab);
-                                                });
-                } else {
-                    part.drawn = draw_one<false>(std::move(triangles), shader, part.where, out,
-                                                 [&](const auto& draws, const grid& g, auto& to) {
-                                                     return voxelize(backend_, draws, g, to, options_.voxelize);
-                                                 });
-                }
-                if (part.drawn.ok()) {
-                    add_drawn(all, part.drawn);
-                    if (!sink(std::as_const(part), out)) // any failure ends the loop; with_sink throws
-                        return core::failure(status_code::device_error);
-                    if constexpr (IsSolid) repairs_.leave();
-                }
-                return part.drawn;
-            });
+        const status s =
+            queue_.for_each(detail::costs_of<Varyings>(options_, voxel, share), false,
+                            [&](const typename queue_type::entry& next, arrays triangles) {
+                                slab part;
+                                part.where = next.where;
+                                part.voxels_before = all.counts.voxels;
+                                part.fragments_before = all.counts.fragments;
+                                output out = make(part.where.extent);
+                                if constexpr (IsSolid) {
+                                    repairs_.enter(next.where, next.triangles);
+                                    if (triangles.numbers.size() == 0 && repairs_.fills_without_triangles())
+                                        triangles = arrays::dropped();
+                                }
+                                part.drawn = draw_one<IsSolid>(std::move(triangles), shader, part.where, out, call);
+                                if (part.drawn.ok()) {
+                                    add_drawn(all, part.drawn);
+                                    if (!sink(std::as_const(part), out)) // any failure ends the loop; with_sink throws
+                                        return core::failure(status_code::device_error);
+                                    if constexpr (IsSolid) repairs_.leave();
+                                }
+                                return part.drawn;
+                            });
         if (!s.ok()) return s;
         if constexpr (IsSolid) repairs_.count(all.solid);
         const counters drawn = all.counts;

@@ -26,8 +26,8 @@ struct stream_options {
     // Bytes that the backend takes for a triangle beside its record, and for a voxel; 0: an estimate. The estimate of a
     // voxel is what the targets take, and a byte more for vote and exterior.
     double triangle_bytes = 0, voxel_bytes = 0;
-    bool is_solid = false; // for draw_solid: triangles beside the grid along x count too
-    // For draw_solid with this repair, whose search begins while triangles come; is_solid then.
+    bool is_solid = false; // for draw_solid and draw_cells: triangles beside the grid along x count too
+    // For draw_solid or draw_cells with this repair, whose search begins while triangles come; is_solid then.
     voxelpipe::repair repair = voxelpipe::repair::none;
     unsigned threads = 0; // of the host, that shade, bin and read; 0: all cores. Results do not depend on it
 

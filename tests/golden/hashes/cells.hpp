@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Cut cells: fractions, apertures and sums of closed, open and broken meshes, by each axis, by draws and in a crop; and
-// all that a shader can ask for.
+// Cut cells: fractions, apertures and sums of closed, open and broken meshes, by each axis, by draws and in a crop; all
+// that a shader can ask for; with holes closed; and links.
 
 #include "cases.hpp"
 
@@ -63,6 +63,25 @@ void cell_measures(Backend& backend, digest& d, const std::vector<mesh_data>& bo
 }
 
 template <class Backend>
+void link_values(Backend& backend, digest& d, const std::vector<mesh_data>& bodies, const vp::grid& grid,
+                 int neighbours) {
+    std::vector<vp::mesh<Backend>> meshes;
+    for (const mesh_data& m : bodies) meshes.push_back(upload(backend, m));
+    std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, vp::none>> draws;
+    for (const auto& m : meshes) draws.push_back({m.view(), {}, {}});
+    vp::link_list<Backend> links(backend);
+    vp::link_options options;
+    options.neighbours = neighbours;
+    add_counts(d, vp::voxelize_links(backend, draws, grid, links, options));
+    std::vector<std::int32_t> voxels;
+    for (const glm::ivec3& p : links.voxels.to_host(backend)) voxels.insert(voxels.end(), {p.x, p.y, p.z});
+    d.add(voxels);
+    d.add(links.q.to_host(backend));
+    d.add(links.primitives.to_host(backend));
+    d.add(links.draws.to_host(backend));
+}
+
+template <class Backend>
 void add_cells(case_table<Backend>& cases) {
     const auto add = [&](const std::string& name, const std::vector<mesh_data>& bodies, const vp::grid& grid,
                          const vp::cell_options& options) {
@@ -90,6 +109,16 @@ void add_cells(case_table<Backend>& cases) {
     by_y.axis = 1;
     measure("draws.axis.y.shells", shells(), odd_grid(), by_y);
     measure("crop.shells", of("shells"), crop_of_odd_grid(), {});
+    vp::cell_options closed;
+    closed.repair = vp::repair::close_holes;
+    add("closed.open", of("open"), odd_grid(), closed);
+    const auto link = [&](const std::string& name, const std::vector<mesh_data>& bodies, const vp::grid& grid,
+                          int neighbours) {
+        cases.push_back({"cells.links." + name,
+                         [=](Backend& backend, digest& d) { link_values(backend, d, bodies, grid, neighbours); }});
+    };
+    for (const char* const mesh : {"torus", "soup"}) link(mesh, of(mesh), odd_grid(), 26);
+    link("draws.crop.shells", shells(), crop_of_odd_grid(), 18);
 }
 
 } // namespace golden

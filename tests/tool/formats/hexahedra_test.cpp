@@ -109,7 +109,7 @@ TEST_F(Hexahedra, NodesAndSidesAreThoseOfTheDefinition) {
             for (std::int64_t x = 0; x < 1400; ++x) v.set_bit(v.channels[0], x, y, z, is_in(x, y, z));
     const voxel_shape shape(v, 2);
     const hexahedra mesh(shape, 2);
-    EXPECT_EQ(10U, mesh.num_parts());
+    EXPECT_EQ(15U, mesh.num_parts());
     const whole_mesh all(mesh);
     std::vector<std::array<std::size_t, 3>> nodes;
     std::vector<glm::ivec3> voxels;

@@ -218,7 +218,8 @@ void describe_solids(CLI::App& app, raw_options& raw) {
         ->group("Solids");
     app.add_option(
            "--close-holes", raw.close_holes,
-           "Put a lid on every hole of the model, of at most EDGES edges where that is given, before it is filled")
+           "Put a lid on every hole of the model, of at most EDGES edges where that is given, before it is filled or "
+           "measured")
         ->option_text("[=EDGES]")
         ->group("Solids");
     app.add_flag("--vote", raw.vote,

@@ -103,13 +103,24 @@ void understand_fill(command_line& options, const std::string& text) {
     }
 }
 
+// The greatest number of edges of holes that --close-holes closes.
+std::uint64_t edges_of_holes(const raw_options& raw) {
+    std::uint64_t edges = UINT64_MAX;
+    if (raw.close_holes == "all") return edges;
+    const char* const end = raw.close_holes.data() + raw.close_holes.size();
+    const auto [last, error] = std::from_chars(raw.close_holes.data(), end, edges);
+    if (error != std::errc{} || last != end || edges == 0)
+        throw usage_error("--close-holes takes the number of edges of the largest hole to close, 1 or more, not \"" +
+                          raw.close_holes + '"');
+    return edges;
+}
+
 } // namespace
 
 void understand_solid(command_line& options, const raw_options& raw) {
     if (raw.coverage) options.voxelize.coverage = *raw.coverage;
     if (!raw.solid && !raw.distance && !raw.remesh) {
         const std::pair<const char*, bool> given[]{{"--solid-extent", raw.extent_of_solid.has_value()},
-                                                   {"--close-holes", !raw.close_holes.empty()},
                                                    {"--vote", raw.vote},
                                                    {"--winding", raw.winding},
                                                    {"--closing", raw.closing.has_value()},
@@ -148,16 +159,7 @@ void understand_solid(command_line& options, const raw_options& raw) {
         if (is_flood || raw.vote)
             throw usage_error(std::string("--close-holes does not go with ") +
                               (is_flood ? "--solid exterior" : "--vote"));
-        solid.close_holes = UINT64_MAX;
-        if (raw.close_holes != "all") {
-            const char* const end = raw.close_holes.data() + raw.close_holes.size();
-            const auto [last, error] = std::from_chars(raw.close_holes.data(), end, solid.close_holes);
-            if (error != std::errc{} || last != end || solid.close_holes == 0)
-                throw usage_error(
-                    "--close-holes takes the number of edges of the largest hole to close, 1 or more, not "
-                    "\"" +
-                    raw.close_holes + '"');
-        }
+        solid.close_holes = edges_of_holes(raw);
     }
     understand_fill(options, raw.fill);
 }
@@ -392,6 +394,8 @@ void understand_outputs(command_line& options, const raw_options& raw) {
 
 void understand_fractions(command_line& options, const raw_options& raw) {
     const voxelize_request& request = options.voxelize;
+    if (!raw.close_holes.empty() && !request.solid && !request.distance && !request.remesh && !request.wants_cells())
+        throw usage_error("--close-holes goes with --solid, or with --target fraction and its like");
     if (!request.wants(target::fraction)) {
         if (request.clamp) throw usage_error("--clamp goes with --target fraction");
         if (raw.threshold) throw usage_error("--threshold goes with --target fraction");
@@ -407,9 +411,8 @@ void understand_fractions(command_line& options, const raw_options& raw) {
         if (request.solid->vote) throw usage_error("--vote" + together + "a voxel is measured by winding numbers");
         if (request.solid->winding)
             throw usage_error("--winding" + together + "a voxel is measured by whole winding numbers");
-        if (request.solid->close_holes != 0)
-            throw usage_error("--close-holes" + together + "lids would close the solid alone");
     }
+    if (!raw.close_holes.empty()) options.voxelize.close_holes = edges_of_holes(raw);
     if (request.alpha == blend_alpha::cutoff)
         throw usage_error("--alpha cutoff" + together + "what is inside follows from whole triangles");
     if (options.storage == storage_choice::sparse)

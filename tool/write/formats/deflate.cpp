@@ -28,6 +28,7 @@ void deflate_open(std::span<const std::byte> piece, int level, std::vector<std::
     stream.avail_out = static_cast<uInt>(out.size());
     deflate(&stream, Z_SYNC_FLUSH); // all of it: there is room
     out.resize(out.size() - stream.avail_out);
+    out.shrink_to_fit(); // pieces wait to be written
     deflateEnd(&stream);
 }
 
@@ -39,6 +40,7 @@ void deflate_whole(std::span<const std::byte> piece, int level, std::vector<std:
                   static_cast<uLong>(piece.size()), level) != Z_OK)
         throw std::bad_alloc{};
     out.resize(size);
+    out.shrink_to_fit();
 }
 
 bool repeats(std::span<const std::byte> piece, std::size_t period) {

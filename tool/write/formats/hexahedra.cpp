@@ -11,7 +11,7 @@ namespace voxelize {
 namespace {
 
 // Corners of a part where every voxel is there, and the most parts, whose first numbers are kept.
-constexpr std::size_t least_part_nodes = std::size_t{1} << 15, most_mesh_parts = std::size_t{1} << 22;
+constexpr std::size_t least_part_nodes = std::size_t{1} << 12, most_mesh_parts = std::size_t{1} << 22;
 
 // to |= from, and the same one further along x.
 void add_both_ends(const std::uint64_t* from, std::uint64_t* to, std::size_t words) {

@@ -29,7 +29,7 @@ void put(std::string& out, T value) {
 template <class Format> // void(std::string& out, std::size_t item)
 void write_items(output_file& out, std::size_t count, int threads, progress_meter& meter, const Format& format,
                  std::size_t item_bytes = 0) {
-    constexpr std::size_t block_items = std::size_t{1} << 15; // formatted at once by one thread
+    constexpr std::size_t block_items = std::size_t{1} << 13; // formatted at once by one thread
     const int workers = thread_count(threads);
     const std::size_t at_once = block_items * static_cast<std::size_t>(4 * workers);
     for (std::size_t begin = 0; begin < count; begin += at_once) {

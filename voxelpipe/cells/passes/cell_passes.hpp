@@ -6,13 +6,19 @@
 
 #include <voxelpipe/cells/passes/cell_rows.hpp>
 #include <voxelpipe/programs/passes/fragment_pool.hpp>
+#include <voxelpipe/solid/core/holes.hpp>
+#include <voxelpipe/surfaces/passes/mesh_rows.hpp>
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
+#include <stdexcept>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -21,6 +27,11 @@ namespace voxelpipe::core {
 // (along the rows, the two other axes) of (x, y, z).
 [[nodiscard]] inline glm::ivec3 turn(const glm::ivec3& p, int axis) {
     return axis == 0 ? p : axis == 1 ? glm::ivec3(p.y, p.z, p.x) : glm::ivec3(p.z, p.x, p.y);
+}
+
+// Turns a position that can be drawn.
+[[nodiscard]] VOXELPIPE_HD inline snapped_position turn(const snapped_position& p, int axis) {
+    return axis == 0 ? p : axis == 1 ? snapped_position{p.y, p.z, p.x} : snapped_position{p.z, p.x, p.y};
 }
 
 // The areas of a voxel's faces, along the rows and the two other axes.
@@ -46,18 +57,18 @@ public:
     cell_scene(Backend& backend, std::span<const Draw> draws, const grid& g, int axis)
         : backend_(backend), counts_(backend, array_view<const std::uint64_t>(zeros.data(), zeros.size())),
           positions_(backend, num_vertices(draws)), triangles_(backend, num_triangles(draws)),
-          first_triangle_(backend, first_triangles(draws)), fraction_(g.fraction()), extent_(turn(g.extent, axis)),
-          areas_(areas_of(g, axis)) {
-        const snap_transform snap = make_snap_transform(g);
+          first_triangle_(backend, 0), fraction_(g.fraction()), extent_(turn(g.extent, axis)),
+          areas_(areas_of(g, axis)), snap_(make_snap_transform(g)), axis_(axis) {
         std::uint64_t first_vertex = 0, first_triangle = 0;
         for (std::size_t d = 0; d < draws.size(); ++d) {
+            begins_.push_back({first_vertex, first_triangle});
             const auto& mesh = draws[d].mesh;
             using mesh_type = std::remove_cvref_t<decltype(mesh)>;
             using shader_type = std::remove_cvref_t<decltype(draws[d].vertex_shader)>;
             const std::uint64_t vertices = mesh.positions.size() * mesh.copies.count;
             const std::uint64_t triangles = mesh.triangles.size() * mesh.copies.count;
             backend.for_each(vertices, passes::snap_vertices_of_cells<mesh_type, shader_type>{
-                                           mesh, draws[d].vertex_shader, static_cast<std::uint32_t>(d), snap, axis,
+                                           mesh, draws[d].vertex_shader, static_cast<std::uint32_t>(d), snap_, axis,
                                            positions_.data() + first_vertex});
             backend.for_each(triangles, passes::join_triangles{elements_of<mesh_type>::indices(mesh),
                                                                static_cast<std::uint32_t>(first_vertex),
@@ -65,6 +76,8 @@ public:
             first_vertex += vertices;
             first_triangle += triangles;
         }
+        begins_.push_back({first_vertex, first_triangle});
+        set_parts();
     }
 
     [[nodiscard]] passes::cell_mesh mesh() const {
@@ -72,6 +85,8 @@ public:
                 triangles_.data(),
                 first_triangle_.data(),
                 static_cast<std::uint32_t>(first_triangle_.size()),
+                static_cast<std::uint32_t>(begins_.size() - 1),
+                static_cast<std::uint32_t>(begins_.back().triangle),
                 static_cast<std::uint32_t>(triangles_.size()),
                 fraction_,
                 extent_,
@@ -80,6 +95,24 @@ public:
     [[nodiscard]] std::uint64_t* counts() { return counts_.data(); }
     [[nodiscard]] std::vector<std::uint64_t> read_counts() const { return counts_.to_host(backend_); }
     [[nodiscard]] const glm::ivec3& extent() const { return extent_; } // turned
+
+    // Vertices and triangles, cones included.
+    [[nodiscard]] std::uint64_t num_vertices() const { return positions_.size(); }
+    [[nodiscard]] std::uint64_t num_triangles() const { return triangles_.size(); }
+
+    // Adds the cones that close the holes of each body, found on the host. Throws as core::close_holes.
+    void close_holes(bodies each, std::uint64_t max_hole_edges, cell_counters& counts) {
+        add_cones(find_cones(each, max_hole_edges), counts);
+    }
+    // The same with cones that are known, of this many bodies, in units of the whole grid.
+    void close_holes(const hole_cones* known, std::size_t num_bodies, cell_counters& counts) {
+        std::vector<hole_cones> cones;
+        for (std::size_t b = 0; b < num_bodies; ++b) {
+            cones.push_back(moved(known[b], snap_.offset));
+            for (snapped_position& p : cones.back().positions) p = turn(p, axis_);
+        }
+        add_cones(std::move(cones), counts);
+    }
 
     void count_open_edges() {
         const std::uint64_t edges = std::uint64_t{3} * triangles_.size();
@@ -99,32 +132,93 @@ public:
     }
 
 private:
+    [[nodiscard]] std::vector<hole_cones> find_cones(bodies each, std::uint64_t max_hole_edges) {
+        const std::vector<snapped_position> positions = positions_.to_host(backend_);
+        std::vector<glm::uvec3> triangles = triangles_.to_host(backend_);
+        std::vector<hole_part> parts;
+        for (std::size_t d = 0; d + 1 < begins_.size(); ++d) {
+            const part_begin from = begins_[d], to = begins_[d + 1];
+            const auto vertices = to.vertex - from.vertex, count = to.triangle - from.triangle;
+            // Bad indices are those of vertex 0, and no vertex of the draw then, or three times the same one.
+            for (std::uint64_t i = from.triangle; i < to.triangle; ++i)
+                triangles[i] -= glm::uvec3(static_cast<std::uint32_t>(from.vertex));
+            parts.push_back({positions.data() + from.vertex, vertices,
+                             instanced_triangles{triangles.data() + from.triangle, static_cast<std::uint32_t>(count),
+                                                 static_cast<std::uint32_t>(vertices)},
+                             count});
+        }
+        std::vector<hole_cones> cones;
+        if (each == bodies::draw) {
+            for (const hole_part& p : parts) cones.push_back(core::close_holes({p}, max_hole_edges));
+        } else {
+            cones.push_back(core::close_holes(parts, max_hole_edges));
+        }
+        return cones;
+    }
+    void add_cones(std::vector<hole_cones>&& cones, cell_counters& counts) {
+        std::uint64_t vertices = positions_.size(), count = triangles_.size();
+        for (const hole_cones& c : cones) {
+            counts.hole_edges += c.edges;
+            counts.holes += c.holes;
+            counts.cones += c.cones;
+            vertices += c.positions.size();
+            count += c.triangles.size();
+        }
+        if (counts.cones == 0) return;
+        if (vertices > std::numeric_limits<std::uint32_t>::max() || count > std::numeric_limits<std::uint32_t>::max())
+            throw std::length_error("voxelpipe: more vertices or triangles than 32 bits number");
+        buffer<snapped_position> more_positions(backend_, vertices);
+        buffer<glm::uvec3> more_triangles(backend_, count);
+        const auto copy = [&](const auto& from, auto* to) {
+            using item = std::remove_pointer_t<decltype(to)>;
+            backend_.for_each(from.size(), passes::copy_items<item>{from.data(), to});
+        };
+        copy(positions_, more_positions.data());
+        copy(triangles_, more_triangles.data());
+        std::uint64_t first_vertex = positions_.size(), first_triangle = triangles_.size();
+        for (hole_cones& c : cones) {
+            first_cones_.push_back(first_triangle);
+            for (glm::uvec3& t : c.triangles) t += glm::uvec3(static_cast<std::uint32_t>(first_vertex));
+            const buffer<snapped_position> p(backend_, array_view<const snapped_position>(c.positions));
+            const buffer<glm::uvec3> t(backend_, array_view<const glm::uvec3>(c.triangles));
+            copy(p, more_positions.data() + first_vertex);
+            copy(t, more_triangles.data() + first_triangle);
+            first_vertex += c.positions.size();
+            first_triangle += c.triangles.size();
+        }
+        positions_ = std::move(more_positions);
+        triangles_ = std::move(more_triangles);
+        set_parts();
+    }
+
     template <class Draw>
     [[nodiscard]] static std::uint64_t num_triangles(std::span<const Draw> draws) {
         std::uint64_t n = 0;
         for (const auto& d : draws) n += d.mesh.triangles.size() * d.mesh.copies.count;
         return n;
     }
-    // Before each draw. Held by the buffer's constructor alone.
-    template <class Draw>
-    [[nodiscard]] buffer<std::uint64_t> first_triangles(std::span<const Draw> draws) {
+    void set_parts() {
         std::vector<std::uint64_t> first;
-        std::uint64_t n = 0;
-        for (const auto& d : draws) {
-            first.push_back(n);
-            n += d.mesh.triangles.size() * d.mesh.copies.count;
-        }
-        return {backend_, array_view<const std::uint64_t>(first.data(), first.size())};
+        for (std::size_t d = 0; d + 1 < begins_.size(); ++d) first.push_back(begins_[d].triangle);
+        first.insert(first.end(), first_cones_.begin(), first_cones_.end());
+        first_triangle_ = buffer<std::uint64_t>(backend_, array_view<const std::uint64_t>(first.data(), first.size()));
     }
+    struct part_begin {
+        std::uint64_t vertex, triangle;
+    };
 
     Backend& backend_;
     buffer<std::uint64_t> counts_;
     buffer<snapped_position> positions_;
     buffer<glm::uvec3> triangles_;
+    std::vector<part_begin> begins_;         // of each draw, and the end
+    std::vector<std::uint64_t> first_cones_; // of each body
     buffer<std::uint64_t> first_triangle_;
     int fraction_;
     glm::ivec3 extent_;
     cell_areas areas_;
+    snap_transform snap_;
+    int axis_;
 };
 
 // The status of a call that has succeeded, or what failed.
@@ -173,10 +267,17 @@ template <class Backend, class Mesh, class VertexShader, class CellShader, class
     };
     // Vertices and edges are numbered in 32 bits.
     if (cell_scene<Backend>::num_vertices(draws) >= most) return fail(status_code::out_of_memory);
-    const bool finds_edges = options.count_open_edges;
-    if (finds_edges && 3 * triangles_in >= most) return fail(status_code::out_of_memory);
-
     cell_scene<Backend> scene(backend, draws, g, options.axis);
+    cell_counters holes;
+    if (options.repair == repair::close_holes) {
+        if (options.cones != nullptr)
+            scene.close_holes(options.cones, options.bodies == bodies::call ? 1 : draws.size(), holes);
+        else
+            scene.close_holes(options.bodies, options.max_hole_edges, holes);
+    }
+    const std::uint64_t triangles = scene.num_triangles();
+    const bool finds_edges = options.count_open_edges;
+    if (finds_edges && 3 * triangles >= most) return fail(status_code::out_of_memory);
     const glm::ivec3 extent = scene.extent();
     const auto wide = [](int n) { return static_cast<std::uint64_t>(n); };
     const passes::cell_keys keys_of{wide(extent.x) + 2, wide(extent.y),
@@ -188,11 +289,11 @@ template <class Backend, class Mesh, class VertexShader, class CellShader, class
     using words = typename Backend::template buffer<std::uint32_t>;
     using numbers = typename Backend::template buffer<std::uint64_t>;
     using terms_type = terms_of_needs<needs_of_cells<cell_fragment_of<CellShader>>>;
-    numbers first_term(backend, triangles_in + 1);
+    numbers first_term(backend, triangles + 1);
     std::uint64_t count = 0;
     {
-        words num_terms(backend, triangles_in + 1);
-        backend.for_each(triangles_in + 1,
+        words num_terms(backend, triangles + 1);
+        backend.for_each(triangles + 1,
                          passes::count_cells<terms_type>{scene.mesh(), num_terms.data(), scene.counts()});
         count = backend.sum(num_terms, first_term);
     }
@@ -201,13 +302,12 @@ template <class Backend, class Mesh, class VertexShader, class CellShader, class
     numbers keys(backend, count);
     words order(backend, count);
     typename Backend::template buffer<terms_type> terms(backend, count);
-    backend.for_each(triangles_in, passes::list_cells<terms_type>{scene.mesh(), keys_of, first_term.data(), keys.data(),
-                                                                  order.data(), terms.data()});
+    backend.for_each(triangles, passes::list_cells<terms_type>{scene.mesh(), keys_of, first_term.data(), keys.data(),
+                                                               order.data(), terms.data()});
     backend.sort_by_key(keys, order, static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys))));
     const passes::record_list<terms_type> list{keys_of, keys.data(), order.data(), terms.data(), count};
     constexpr std::uint64_t safe = std::uint64_t{1} << 19; // triangles whose covers cannot wrap
-    backend.for_each(rows * keys_of.bodies,
-                     passes::measure_rows<terms_type>{list, triangles_in >= safe, scene.counts()});
+    backend.for_each(rows * keys_of.bodies, passes::measure_rows<terms_type>{list, triangles >= safe, scene.counts()});
     if (const status s = make_cell_status(scene.read_counts(), options, triangles_in, count); !s.ok()) return s;
 
     if (const status begun = begin_fold(backend, fb); !begun.ok()) return begun;
@@ -220,7 +320,11 @@ template <class Backend, class Mesh, class VertexShader, class CellShader, class
     backend.for_each(rows, passes::shade_cells<CellShader, Targets...>{
                                list, scene.mesh(), of_bodies.data(), keys_of.bodies == 1 ? nullptr : cursors.data(), fb,
                                g.offset, options.axis, extent.x, scene.counts()});
-    return make_cell_status(scene.read_counts(), options, triangles_in, count);
+    status s = make_cell_status(scene.read_counts(), options, triangles_in, count);
+    s.cells.hole_edges = holes.hole_edges;
+    s.cells.holes = holes.holes;
+    s.cells.cones = holes.cones;
+    return s;
 }
 
 } // namespace voxelpipe::core

@@ -61,6 +61,7 @@ struct count_cells {
                 n += static_cast<std::uint32_t>(n != ~0u);
             });
         num_terms[i] = n;
+        if (i >= mesh.num_drawn) return; // cones are nobody's triangles
         if (kind == triangle_class::nonfinite) add_count(counts, cell_count::nonfinite, 1);
         if (kind == triangle_class::too_far) add_count(counts, cell_count::too_far, 1);
         if (kind == triangle_class::outside) add_count(counts, cell_count::outside, 1);
@@ -79,7 +80,7 @@ struct list_cells {
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         std::uint64_t to = first_term[i];
         if (first_term[i + 1] == to) return;
-        const std::uint64_t body = keys_of.bodies == 1 ? 0 : find_owner(mesh.first_triangle, mesh.num_draws, i);
+        const std::uint64_t body = keys_of.bodies == 1 ? 0 : mesh.draw_of(i);
         visit_cells<false, Terms>(mesh, i,
                                   [&](std::uint64_t y, std::uint64_t z, std::uint64_t slot, const Terms& of_voxel) {
                                       keys[to] = keys_of.key(y, z, body, slot);

@@ -47,13 +47,20 @@ namespace passes {
 struct cell_mesh {
     const snapped_position* positions;
     const glm::uvec3* triangles;         // of bad indices: all of them vertex 0, which counts
-    const std::uint64_t* first_triangle; // of each draw
+    const std::uint64_t* first_triangle; // of each draw, then of the cones of each draw, or of all, if there are any
+    std::uint32_t num_parts;             // of them
     std::uint32_t num_draws;
-    std::uint32_t num_triangles;
+    std::uint32_t num_drawn;     // triangles of the draws
+    std::uint32_t num_triangles; // and of cones, which come behind
     int fraction;
     glm::ivec3 extent; // turned, too
     cell_areas areas;  // of the turned voxel
 
+    // Which draw, or whose holes: of several bodies the body.
+    [[nodiscard]] VOXELPIPE_HD std::uint32_t draw_of(std::uint64_t triangle) const {
+        const std::uint32_t part = find_owner(first_triangle, num_parts, triangle);
+        return part < num_draws ? part : part - num_draws;
+    }
     [[nodiscard]] VOXELPIPE_HD snapped_position corner(std::uint64_t triangle, int i) const {
         const glm::uvec3& t = triangles[triangle];
         return positions[i == 0 ? t.x : i == 1 ? t.y : t.z];

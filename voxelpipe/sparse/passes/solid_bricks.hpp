@@ -176,7 +176,8 @@ void make_solid_bricks(Backend& backend, found_rows<Backend>&& found, const glm:
     using level_type = row_level<Backend>;
     using list_type = run_list<Backend>;
     if (found.places.size() == 0) return;
-    if (found.places.size() >> 32 != 0) throw std::length_error("voxelpipe: a solid has 2^32 - 1 rows at most");
+    if (std::uint64_t{found.places.size()} >> 32 != 0)
+        throw std::length_error("voxelpipe: a solid has 2^32 - 1 rows at most");
     const auto bits_of = [](std::uint64_t most) { return std::max(1, static_cast<int>(std::bit_width(most))); };
     auto [voxel_rows, runs] =
         sort_rows(backend, std::move(found), bits_of(morton_key(0, whole_extent.y - 1, whole_extent.z - 1)));
