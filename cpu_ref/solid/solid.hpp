@@ -81,7 +81,7 @@ template <class Crossing, class Finish>
     const bool is_winding = options.repair == repair::winding;
     if ((is_set && !is_winding) || options.extent != solid_extent::centre) {
         cover_list cover = is_decided   ? count_triangles(s)
-                           : is_winding ? find_cover(how, without_cones(s))
+                           : is_winding ? find_cover(how, keep_parts(s, false))
                                         : find_cover(how, s);
         if (cover.code != status_code::ok) return solid_failure(cover.code, s);
         if (options.repair == repair::exterior) result.counts = cover.counts;

@@ -100,6 +100,16 @@ struct seen_angle {
                      : see_wide(a, b, c, sample);
 }
 
+// True if the point lies on the closed triangle, and that has an area.
+[[nodiscard]] VOXELPIPE_HD inline bool is_on_triangle(const snapped_position& a, const snapped_position& b,
+                                                      const snapped_position& c, const snapped_position& p) {
+    if (min3(a.x, b.x, c.x) > p.x || max3(a.x, b.x, c.x) < p.x || min3(a.y, b.y, c.y) > p.y ||
+        max3(a.y, b.y, c.y) < p.y || min3(a.z, b.z, c.z) > p.z || max3(a.z, b.z, c.z) < p.z)
+        return false;
+    const seen_triangle seen = see_wide(a, b, c, p);
+    return !(seen.volume < 0.0 || seen.volume > 0.0) && find_angle(seen, distance_scale{}).is_on;
+}
+
 // Bits behind the point of sums of n solid angles over 4 pi, each at most 1/2: no sum of theirs exceeds 2^61.
 [[nodiscard]] VOXELPIPE_HD constexpr int angle_bits(std::uint32_t n) {
     int log2 = 0; // 2^log2 > n

@@ -56,15 +56,19 @@ struct crossing_toggler {
 struct winding_adder {
     static constexpr bool is_listing = false;
     std::int32_t* windings;
+    std::int32_t* of_cones;  // what of it is of cones
     std::uint64_t of_body;   // places
     bool is_split;           // a body a draw
     std::uint32_t num_draws; // the cones of body k are draw num_draws + k
 
     __device__ VOXELPIPE_INLINE void emit(const row_grid& grid, unsigned long long, std::uint32_t draw,
                                           std::uint64_t row, std::int64_t first, int winding) const {
-        const std::uint64_t body = !is_split ? 0 : draw < num_draws ? draw : draw - num_draws;
+        const bool is_cone = draw >= num_draws;
+        const std::uint64_t body = is_cone ? draw - num_draws : is_split ? draw : 0;
         const std::uint64_t row_places = static_cast<std::uint64_t>(grid.extent.x) + 1;
-        atomicAdd(windings + body * of_body + row * row_places + grid.position(first), winding > 0 ? 1 : -1);
+        const std::uint64_t place = body * of_body + row * row_places + grid.position(first);
+        atomicAdd(windings + place, winding > 0 ? 1 : -1);
+        if (is_cone) atomicAdd(of_cones + place, winding > 0 ? 1 : -1);
     }
 };
 

@@ -29,8 +29,9 @@
     HOW void fill_to_exterior<0>(const exterior_memory&, word*, cudaStream_t);                                         \
     HOW void add_votes<0>(const vote_memory&, const stored_triangles&, std::uint32_t, std::uint32_t, const row_grid&,  \
                           const solid_slab*, word*, pipeline_state*, cudaStream_t);                                    \
-    HOW void add_windings<0>(const winding_memory&, const core::winding_view&, const row_grid&, fill_rule,             \
-                             solid_extent, std::uint32_t, const glm::dvec3&, word*, pipeline_state*, cudaStream_t);
+    HOW void add_windings<0>(const winding_memory&, const core::winding_view&, const geometry&,                        \
+                             const winding_triangles&, const row_grid&, fill_rule, solid_extent, std::uint32_t, word*, \
+                             pipeline_state*, cudaStream_t);
 
 #if defined(VOXELPIPE_LINKS_CUDA_KERNELS)
 namespace voxelpipe::device {

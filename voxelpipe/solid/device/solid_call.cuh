@@ -249,7 +249,7 @@ private:
         const bool is_winding = plan.options.repair == repair::winding;
         if (is_winding) {
             m.winding.clear(rows(), num_bodies(), stream);
-            const winding_adder sink{m.winding.windings, m.winding.of_body(rows()), is_split(),
+            const winding_adder sink{m.winding.windings, m.winding.of_cones, m.winding.of_body(rows()), is_split(),
                                      static_cast<std::uint32_t>(draws.size())};
             emit_crossings(stored_triangles{geo, rows(), plan.num_primitives, num_drawn(geometry_of)}, rows(), sink,
                            m.kept.with(state), state, stream);
@@ -258,8 +258,12 @@ private:
             if (!is_winding || plan.options.extent != solid_extent::centre)
                 cover_body(m, geo, geometry_of, body, first, last, state, stream);
             if (is_winding) {
-                add_windings(m.winding, cones[body].tree, rows(), plan.options.rule, plan.options.extent, body,
-                             plan.g.voxel_size, m.cover.mask, state, stream);
+                // Behind the draws are the cones, body by body.
+                const std::uint32_t first_cone = geometry_of[draws.size() + body].first_primitive;
+                const winding_triangles of_body{geometry_of[first].first_primitive, geometry_of[last].first_primitive,
+                                                first_cone, first_cone + cones[body].num_triangles};
+                add_windings(m.winding, cones[body].tree, geo, of_body, rows(), plan.options.rule, plan.options.extent,
+                             body, m.cover.mask, state, stream);
             } else if (plan.options.repair == repair::exterior && plan.options.slab != nullptr) {
                 // The cover has counted the triangles; the inside is known.
                 copy_from_slab(m.cover.mask, plan.options.slab->inside, {plan.g.extent}, plan.g.extent.z, stream);

@@ -4,12 +4,12 @@
 
 // repair::close_holes and repair::winding: the snapped mesh goes to the host once, which finds the holes and their
 // cones (solid/core/holes.hpp), and the cones come back as further triangles of each body; for repair::winding with a
-// tree over them.
+// tree over the holes.
 
 #include <voxelpipe/device/base/device_buffer.cuh>
 #include <voxelpipe/device/scene/scene_memory.cuh>
 #include <voxelpipe/solid/core/holes.hpp>
-#include <voxelpipe/solid/core/winding_tree.hpp>
+#include <voxelpipe/solid/core/winding_lids.hpp>
 #include <voxelpipe/solid/solid.hpp>
 
 #include <cstdint>
@@ -25,7 +25,7 @@ namespace voxelpipe::device {
 struct cone_part {
     draw_geometry geometry; // first_primitive is unset
     std::uint32_t num_triangles = 0;
-    core::winding_view tree{}; // repair::winding: of the same triangles
+    core::winding_view tree{}; // repair::winding: of the same holes
 };
 
 // The cones of a call, and their memory.
@@ -38,9 +38,8 @@ struct solid_cones {
     std::vector<device_buffer<core::snapped_position>> positions;
     std::vector<device_buffer<int32_position>> near;
     std::vector<device_buffer<glm::uvec3>> triangles;
-    std::vector<device_buffer<core::winding_node>> nodes;
-    std::vector<device_buffer<core::winding_piece>> pieces;
-    std::vector<device_buffer<core::snapped_position>> corners;
+    std::vector<device_buffer<core::winding_node>> nodes, holes;
+    std::vector<device_buffer<core::snapped_position>> lids, corners;
     std::vector<device_buffer<core::winding_view>> trees; // repair::winding: one array, of the parts' trees
 };
 
@@ -121,15 +120,14 @@ template <class Mesh, class VertexShader, class SolidShader>
                          num_vertices};
         if (options.repair == repair::winding) {
             const core::winding_tree tree(
-                cones, core::make_distance_scale(g.voxel_size, core::make_snap_transform(g).fraction),
-                core::largest_side(g.voxel_size));
-            auto& nodes = made.nodes.emplace_back(
-                from, array_view<const core::winding_node>(tree.nodes().data(), tree.nodes().size()));
-            auto& pieces = made.pieces.emplace_back(
-                from, array_view<const core::winding_piece>(tree.pieces().data(), tree.pieces().size()));
+                cones, core::make_distance_scale(g.voxel_size, core::make_snap_transform(g).fraction));
+            using nodes_view = array_view<const core::winding_node>;
+            auto& nodes = made.nodes.emplace_back(from, nodes_view(tree.nodes().data(), tree.nodes().size()));
+            auto& holes = made.holes.emplace_back(from, nodes_view(tree.holes().data(), tree.holes().size()));
+            auto& lids = made.lids.emplace_back(from, positions_view(tree.lids().data(), tree.lids().size()));
             auto& corners =
                 made.corners.emplace_back(from, positions_view(tree.corners().data(), tree.corners().size()));
-            part.tree = tree.view(nodes.data(), pieces.data(), corners.data());
+            part.tree = tree.view(nodes.data(), lids.data(), holes.data(), corners.data());
         }
         made.parts.push_back(part);
         made.num_triangles += cones.triangles.size();
