@@ -456,7 +456,8 @@ TEST(WindingTree, SamplesHaveTheVerdictsOfTheWholeSum) {
     splitmix64 random(15);
     const vp::grid g = unit_grid(glm::ivec3(24));
     const open_mesh many(less_triangles(sphere(glm::vec3(12.0f), 9.0f, 4), random, 100), g),
-        one(bitten_sphere(random, 12.0f, 9.0f), g), flat(less_faces(sides, {0, 4}), unit_grid(glm::ivec3(16)));
+        one(bitten_sphere(random, 12.0f, 9.0f), g),
+        flat(less_faces(box({3.5f, 3.5f, 3.5f}, {11.5f, 12.5f, 10.5f}), {0}), unit_grid(glm::ivec3(16)));
     for (const open_mesh* m : {&many, &one, &flat}) {
         const core::winding_view view = m->tree.view();
         std::size_t on_cones = 0;
@@ -528,7 +529,7 @@ TEST(WindingTree, BricksDecideTheirSamplesAsTheWholeSumDoes) {
     }
     for (const auto kind : {verdict::outside, verdict::inside, verdict::beyond, verdict::number, verdict::unknown})
         EXPECT_GT(of_kind[kind], 0u) << kind;
-    EXPECT_LT(of_kind[verdict::unknown], 200u) << "of 1024";
+    EXPECT_LT(of_kind[verdict::unknown], 512u) << "of 1024";
 }
 
 TEST(WindingTree, MarksOfBricksMissNoTriangleAndSamplesOnTrianglesAreAllFound) {
@@ -560,7 +561,7 @@ TEST(WindingTree, MarksOfBricksMissNoTriangleAndSamplesOnTrianglesAreAllFound) {
             const bool is_on = core::is_on_triangle(v[0], v[1], v[2], p);
             ASSERT_EQ(found[static_cast<std::size_t>(s)], is_on ? 1 : 0);
             on += is_on ? 1 : 0;
-            if (is_on) EXPECT_EQ(bricks[static_cast<std::size_t>((z / 8 * 3 + y / 8) * 3 + x / 8)], 1);
+            ASSERT_TRUE(!is_on || bricks[static_cast<std::size_t>((z / 8 * 3 + y / 8) * 3 + x / 8)] == 1);
         }
         // Points of the triangle, within the box of a brick's samples.
         if (i % 7 == 0) continue;

@@ -120,7 +120,7 @@ struct node_offset {
 
 // The holes near a ball, and what all others cover at most from any of its points.
 struct near_holes {
-    static constexpr std::uint32_t most = 48;
+    static constexpr std::uint32_t most = 256;
     double far_angle = 0.0;
     std::uint32_t count = 0; // more than `most`: not all are listed
     std::uint32_t hole[most];
@@ -131,12 +131,13 @@ struct near_holes {
     for (std::uint32_t i = 0; i < t.num_holes;) {
         const winding_node& n = t.holes[i];
         const double angle = most_angle(n, p, reach);
-        if (angle <= 0x1p-8 * four_pi) {
+        const bool is_leaf = n.behind == i + 1;
+        if (angle <= (is_leaf ? 0x1p-9 : 0x1p-13) * four_pi) { // there are many that are far
             r.far_angle += angle;
             i = n.behind;
             continue;
         }
-        if (n.behind == i + 1) {
+        if (is_leaf) {
             if (r.count < near_holes::most) r.hole[r.count] = i;
             ++r.count;
         }
