@@ -47,7 +47,7 @@ enum class repair : std::uint8_t {
     // Where the generalized winding number is at least 1/2, or with fill_rule::nonzero its magnitude: the solid angles
     // of all triangles over 4 pi, which across a hole falls smoothly. even_odd is refused with bad_solid_options, voxel
     // sizes outside 2^-100 .. 2^100 with bad_voxel_size. Holes and their cones are those of close_holes; they do not
-    // belong to the cover. On a GPU a call takes 4 bytes a voxel and body.
+    // belong to the cover. On a GPU a call takes 8 bytes a voxel and body.
     winding,
 };
 
