@@ -106,6 +106,25 @@ TEST(BackendEstimate, CountsTheWork) {
     EXPECT_EQ("about 12 ms on the CPU, about 255 ms with CUDA, its start included", voxelize::in_words(12.2, 254.9));
 }
 
+// Bricks are a small part of the grid that a dense result holds; distances take long on the CPU.
+TEST(BackendEstimate, KnowsBricksAndDistances) {
+    voxelize::voxelize_request request;
+    request.grid.extent = glm::ivec3(1024);
+    request.targets = {voxelize::target::color};
+    EXPECT_GT(work_of(request, 1e5, 1e6).result_bytes, 20 * work_of(request, 1e5, 1e6, true).result_bytes);
+    request.grid.extent = glm::ivec3(512);
+    request.targets = {voxelize::target::distance};
+    EXPECT_EQ(0, work_of(request, 1e5, 1e6).samples);
+    request.distance.emplace();
+    request.distance->band = 3;
+    const voxelize::work_size band = work_of(request, 1e5, 1e6);
+    request.distance->is_whole = true;
+    const voxelize::work_size whole = work_of(request, 1e5, 1e6);
+    EXPECT_EQ(512.0 * 512 * 512, whole.samples);
+    EXPECT_LT(3 * band.samples, whole.samples);
+    EXPECT_GT(cpu_milliseconds(whole, 16), cuda_milliseconds(whole, 0));
+}
+
 TEST(BackendEstimate, CudaStartsEarlyOnlyWhereItMayPay) {
     voxelize::voxelize_request request;
     request.threads = 2;
@@ -153,6 +172,14 @@ void expect_no_cuda(const std::string& reason) {
     EXPECT_EQ("", cuda.out);
     EXPECT_EQ("voxelize: --backend cuda: " + reason + "; use --backend cpu\n", cuda.err);
     EXPECT_FALSE(std::filesystem::exists(folder / "cuda.npz"));
+    // Bricks, distances and remeshes have the same way to a GPU.
+    for (const char* drawn : {"--sparse", "--distance", "--remesh"}) {
+        const std::vector<std::string> small{model, "-o", folder / "small.glb", "--backend", "cuda", "-r", "16",
+                                             "-q",  drawn};
+        const outcome refused = run(folder, small);
+        EXPECT_EQ(5, refused.code) << drawn;
+        EXPECT_EQ("voxelize: --backend cuda: " + reason + "; use --backend cpu\n", refused.err) << drawn;
+    }
 
     ASSERT_EQ(0, run(folder, arguments(folder / "cpu.npz", "cpu")).code);
     std::vector<std::string> list = arguments(folder / "auto.npz", "auto");

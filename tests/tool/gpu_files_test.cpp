@@ -37,6 +37,10 @@ json stats_of(const outcome& result) {
 // Runs the program on both backends and compares its files and counts.
 void expect_same_files(const scratch_folder& folder, const fs::path& model, std::vector<std::string> options,
                        const std::vector<std::string>& names) {
+    const auto has = [&](const char* option) {
+        return std::find(options.begin(), options.end(), option) != options.end();
+    };
+    const bool has_stages = !has("--distance") && !has("--remesh") && !has("--sparse");
     std::string what = model.filename().string();
     for (const std::string& option : options) what += ' ' + option;
     SCOPED_TRACE(what);
@@ -57,15 +61,16 @@ void expect_same_files(const scratch_folder& folder, const fs::path& model, std:
     EXPECT_NE("", stats[1]["device"]);
     EXPECT_LT(0, stats[1]["device_memory_bytes"]);
     double sum = 0;
-    for (const char* stage :
-         {"options", "read", "place", "cuda_start", "upload", "vertex_shade", "coarse_raster", "tile_sort",
-          "tile_split", "clear", "fine_raster", "tile_resolve", "cuda_calls", "resolve", "write", "release", "other"})
-        ASSERT_TRUE(stats[1]["ms"].contains(stage)) << stage;
+    for (const char* stage : {"options", "read", "place", "cuda_start", "write", "other"})
+        EXPECT_TRUE(stats[1]["ms"].contains(stage)) << stage;
+    for (const char* stage : {"upload", "vertex_shade", "coarse_raster", "tile_sort", "tile_split", "clear",
+                              "fine_raster", "tile_resolve", "cuda_calls", "resolve"})
+        ASSERT_TRUE(!has_stages || stats[1]["ms"].contains(stage)) << stage;
     for (const auto& [stage, time] : stats[1]["ms"].items()) {
         EXPECT_LE(0.0, time) << stage;
         if (stage != "total") sum += time.get<double>();
     }
-    EXPECT_LT(0.0, stats[1]["ms"]["fine_raster"]);
+    if (has_stages) EXPECT_LT(0.0, stats[1]["ms"]["fine_raster"]);
     EXPECT_NEAR(sum, stats[1]["ms"]["total"], 1e-6);
     // Some formats take a file for each target.
     ASSERT_EQ(stats[0]["files"].size(), stats[1]["files"].size());
@@ -122,6 +127,67 @@ TEST(GpuFiles, OfAModelWithEverythingInIt) {
     expect_same_files(folder, model, {"-r", "33", "--depth-axis", "x", "-t", "depth,normal"}, {"a.npz"});
 }
 
+// The same drawer's bricks: surfaces with lines, masks and instances, colours that the sides see, solids with tiles,
+// repairs and bodies, in one slab and in many.
+TEST(GpuFiles, OfBricks) {
+    const scratch_folder folder;
+    const std::string lined = folder / "lined.glb", model = folder / "m.glb";
+    gltf_test::lined_world().write_glb(lined);
+    gltf_test::small_world().write_glb(model);
+    for (const std::string& shown : {lined, model})
+        for (const char* coverage : {"conservative", "thin", "crosshair", "diagonal"}) {
+            expect_same_files(folder, shown, {"-r", "100", "--sparse", "--coverage", coverage, "-t", all_targets},
+                              {"a.npz"});
+            expect_same_files(
+                folder, shown,
+                {"-r", "300", "--sparse", "--coverage", coverage, "--work-memory", "1", "-t", all_targets}, {"a.npz"});
+            expect_same_files(folder, shown, {"-r", "90", "--sparse", "--coverage", coverage}, {"a.nvdb", "a.npy"});
+            expect_same_files(folder, shown, {"-r", "70", "--sparse", "--coverage", coverage, "-t", "count"},
+                              {"a.npz"});
+        }
+    for (const char* rule : {"nonzero", "even_odd", "positive", "each_draw"})
+        for (const char* extent : {"outer", "inner"}) {
+            expect_same_files(folder, model,
+                              {"-r", "130", "--sparse", "--solid", rule, "--solid-extent", extent, "-t", all_targets},
+                              {"a.npz"});
+            expect_same_files(folder, model, {"-r", "200", "--sparse", "--solid", rule, "-t", "occupancy,count"},
+                              {"a.nvdb"});
+        }
+    const std::vector<std::vector<std::string>> repairs{{"--solid", "nonzero", "--close-holes"},
+                                                        {"--solid", "even_odd", "--vote"},
+                                                        {"--solid", "exterior", "--closing", "2", "--padding", "3"},
+                                                        {"--solid", "nonzero", "--fill", "mean"},
+                                                        {"--solid", "nonzero", "--fill", "#ff8000"}};
+    for (std::vector<std::string> repair : repairs) {
+        repair.insert(repair.end(), {"-r", "110", "--sparse", "-t", all_targets});
+        expect_same_files(folder, model, repair, {"a.npz"});
+    }
+    expect_same_files(folder, model, {"-r", "150", "--sparse", "--padding", "5"}, {"a.vox", "a.png", "a.ply"});
+}
+
+TEST(GpuFiles, OfDistancesAndRemeshes) {
+    const scratch_folder folder;
+    const std::string model = folder / "m.glb";
+    gltf_test::small_world().write_glb(model);
+    const std::vector<std::vector<std::string>> distances{
+        {"-r", "90"},
+        {"-r", "60", "-t", "color,normal,material,triangle,depth,nearest"},
+        {"-r", "40", "--band", "whole", "-t", "nearest"},
+        {"-r", "50", "--corners", "--solid", "each_draw"},
+        {"-r", "50", "--unsigned", "-t", "color"},
+        {"-r", "50", "--close-holes"}};
+    for (std::vector<std::string> options : distances) {
+        options.push_back("--distance");
+        expect_same_files(folder, model, options, {"a.npz", "a.nvdb"});
+    }
+    for (const char* place : {"sharp", "mean", "corner"}) {
+        expect_same_files(folder, model, {"-r", "70", "--remesh", "--place", place}, {"a.glb", "a.npz"});
+        expect_same_files(folder, model, {"-r", "40", "--remesh", "--place", place, "--iso", "0.1", "--quads"},
+                          {"a.ply"});
+    }
+    expect_same_files(folder, model, {"-r", "60", "--remesh", "--solid", "exterior", "--closing", "1"}, {"a.glb"});
+}
+
 TEST(GpuFiles, OfModelsOfManyKinds) {
     if (models().empty() || !fs::exists(models())) GTEST_SKIP() << "VOXELPIPE_GLTF_DIR is not there";
     const scratch_folder folder;
@@ -133,7 +199,9 @@ TEST(GpuFiles, OfModelsOfManyKinds) {
         if (!fs::exists(model)) continue;
         ++compared;
         for (const char* coverage : {"conservative", "thin"})
-            expect_same_files(folder, model, {"-r", "160", "--coverage", coverage, "-t", all_targets}, {"a.npz"});
+            for (const char* storage : {"--dense", "--sparse"})
+                expect_same_files(folder, model, {"-r", "160", storage, "--coverage", coverage, "-t", all_targets},
+                                  {"a.npz"});
         expect_same_files(folder, model, {"-r", "128"}, {"a.vox"});
     }
     std::printf("%d models compared\n", compared);

@@ -282,7 +282,7 @@ TEST(Distance, WhatDoesNotGoTogetherIsRefused) {
     refused({"--distance", "--levels"}, "--levels does not go with --distance");
     refused({"--distance", "--sparse"}, "--sparse does not go with --distance");
     refused({"--distance", "--closing", "2"}, "--closing goes with --solid exterior");
-    refused({"--distance", "--backend", "cuda"}, "on the CPU alone", 5);
+    refused({"--distance", "--backend", "cuda", "--devices", "2"}, "one GPU draws distances", 5);
 }
 
 TEST(Distance, AFieldBeyondMemoryIsRefusedWithBothNumbers) {

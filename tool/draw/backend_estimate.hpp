@@ -15,13 +15,15 @@ namespace voxelize {
 struct work_size {
     double triangles = 0;
     double fragments = 0;    // estimated: a voxel's side of the grid's box counts three times, each triangle twice
+    double samples = 0;      // that --distance looks for the nearest triangle of
     bool shaded = false;     // colours, normals, numbers or depths, not only bits and counts
     double model_bytes = 0;  // vertices, indices and texels
-    double result_bytes = 0; // of the volume
+    double result_bytes = 0; // of the volume, or of its bricks
 };
 
-// The work of a request for a model of that many triangles and bytes.
-[[nodiscard]] work_size work_of(const voxelize_request& request, double triangles, double model_bytes);
+// The work of a request for a model of that many triangles and bytes, drawn into a dense grid or into bricks.
+[[nodiscard]] work_size work_of(const voxelize_request& request, double triangles, double model_bytes,
+                                bool in_bricks = false);
 
 // Time on the CPU with that many threads.
 [[nodiscard]] double cpu_milliseconds(const work_size& work, int threads);

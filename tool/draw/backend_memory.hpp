@@ -28,6 +28,11 @@ struct memory_access {
             for (std::size_t i = b * block; i < std::min(count, (b + 1) * block); ++i) out[i] = value(i);
         });
     }
+    // Copies a list out of the backend's memory.
+    template <class T>
+    [[nodiscard]] static std::vector<T> list(Backend&, const T* from, std::size_t count) {
+        return std::vector(from, from + count);
+    }
 };
 
 // A list of the scene where the backend reads it: taken over where that is host memory, otherwise copied.

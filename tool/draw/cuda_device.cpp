@@ -3,9 +3,14 @@
 // The part of cuda_device.hpp that needs no CUDA: what the facts mean.
 #include "cuda_device.hpp"
 
+#include "backend_estimate.hpp"
+#include "model/parallel.hpp"
+
 #include <voxelpipe/slabs/plan.hpp>
 
 #include <algorithm>
+#include <chrono>
+#include <optional>
 #include <utility>
 
 namespace voxelize {
@@ -104,6 +109,55 @@ std::string why_too_large(const cuda_facts& facts, const scene& model, const vox
     if (needed <= room) return {};
     return "the model needs " + at_least_mebibytes(needed) + " of GPU memory, and of the " +
            mebibytes(facts.total_memory) + " of the " + facts.name + ' ' + mebibytes(room) + " may be used";
+}
+
+namespace {
+
+// The user has chosen how a GPU draws, or how many draw.
+bool is_forced(const voxelize_request& request) {
+    return request.strategy != voxelpipe::strategy::automatic || request.devices != 1;
+}
+
+} // namespace
+
+std::optional<cuda_facts> usable_cuda(const scene& model, const voxelize_request& request, bool in_bricks,
+                                      voxelize_stats& stats) {
+    const auto start = std::chrono::steady_clock::now();
+    if (request.backend == backend_choice::automatic && !is_forced(request) && built_with_cuda()) {
+        const work_size work = work_of(request, static_cast<double>(model.triangle_count() + model.line_count()),
+                                       static_cast<double>(input_bytes(model)), in_bricks);
+        const double on_cpu = cpu_milliseconds(work, thread_count(request.threads));
+        const double on_cuda = cuda_milliseconds(work, request.cuda ? request.cuda->milliseconds_ago() : 0);
+        stats.estimate = in_words(on_cpu, on_cuda);
+        if (on_cpu <= on_cuda) {
+            stats.no_cuda = "the CPU is quicker here: " + stats.estimate;
+            return std::nullopt;
+        }
+    }
+    const cuda_facts facts = request.cuda ? request.cuda->facts() : look_for_cuda();
+    stats.no_cuda = why_not(facts);
+    if (!stats.no_cuda.empty()) {
+        if (is_forced(request))
+            throw backend_error((request.devices != 1 ? std::string("--devices")
+                                                      : std::string("--strategy ") + to_string(request.strategy)) +
+                                " needs a GPU: " + stats.no_cuda);
+        if (request.backend == backend_choice::cuda)
+            throw backend_error("--backend cuda: " + stats.no_cuda + "; use --backend cpu");
+        return std::nullopt;
+    }
+    if (request.devices > facts.devices)
+        throw backend_error("--devices " + std::to_string(request.devices) + ": the NVIDIA driver shows " +
+                            std::to_string(facts.devices));
+    const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - start;
+    stats.milliseconds.emplace_back("cuda_start", time.count());
+    return facts;
+}
+
+void fall_back_on_cpu(const device_memory_error& error, const voxelize_request& request, voxelize_stats& stats) {
+    if (request.backend == backend_choice::cuda || is_forced(request))
+        throw memory_error(std::string("--backend cuda: ") + error.what() + "; use --backend cpu");
+    stats.no_cuda = error.what();
+    stats.warnings.push_back(stats.no_cuda + "; the CPU does the work");
 }
 
 } // namespace voxelize

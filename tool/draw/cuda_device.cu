@@ -20,6 +20,12 @@ VOXELIZE_CUDA_BITS(extern)
 VOXELIZE_CUDA_SURFACE(extern)
 VOXELIZE_CUDA_OUTER(extern)
 VOXELIZE_CUDA_SOLID(extern)
+VOXELIZE_CUDA_BRICK_BITS(extern)
+VOXELIZE_CUDA_BRICK_SURFACE(extern)
+VOXELIZE_CUDA_BRICK_OUTER(extern)
+VOXELIZE_CUDA_BRICK_SOLID(extern)
+VOXELIZE_CUDA_DISTANCE(extern)
+VOXELIZE_CUDA_REMESH(extern)
 
 namespace {
 
@@ -91,13 +97,123 @@ volume draw_on_devices(const slabs::devices& gpus, scene& model, const voxelize_
     return result;
 }
 
+// The GPU has refused that many bytes.
+device_memory_error too_little_memory(const cuda_facts& facts, const voxelize_request& request, std::uint64_t refused) {
+    return device_memory_error(
+        "the GPU has too little memory: at least " + std::to_string(refused >> 20) + " MiB are needed, and of the " +
+        std::to_string(facts.total_memory >> 20) + " MiB of the " + facts.name + ' ' +
+        std::to_string(facts.free_memory >> 20) + " MiB were free" +
+        (request.device_memory != 0
+             ? ", " + std::to_string(request.device_memory >> 20) + " MiB of them for this program"
+             : std::string()));
+}
+
+limited_memory memory_of(const voxelize_request& request) {
+    return limited_memory{request.device_memory != 0 ? request.device_memory : UINT64_MAX};
+}
+
+// The first GPU, which works for one request.
+class one_gpu {
+public:
+    one_gpu(const cuda_facts& facts, const voxelize_request& request, voxelize_stats& stats)
+        : facts_(facts), request_{request}, stats_{stats}, memory_(memory_of(request)), gpus_({0}) {
+        backend().resource = memory_;
+        backend().strategy = request.strategy;
+        stats.backend = "cuda";
+        stats.device = facts.name;
+        stats.devices = 1;
+        stats.threads = thread_count(request.threads);
+    }
+    [[nodiscard]] vp::cuda_backend& backend() { return gpus_.backend(0); }
+
+    // work() with the GPU as the thread's. Throws device_memory_error.
+    template <class Work>
+    void run(const Work& work) {
+        try {
+            gpus_.for_each(1, [&](std::size_t, vp::cuda_backend&) { work(); });
+        } catch (const std::bad_alloc&) {
+            if (memory_.refused() == 0) throw;
+            throw too_little_memory(facts_, request_, memory_.refused());
+        }
+        stats_.device_memory = std::max(stats_.device_memory, memory_.most());
+        stats_.strategy = backend().last_strategy();
+    }
+
+private:
+    cuda_facts facts_;
+    const voxelize_request& request_;
+    voxelize_stats& stats_;
+    limited_memory memory_;
+    slabs::devices gpus_;
+};
+
+// Bricks on the first GPU.
+class cuda_bricks : public brick_drawer {
+public:
+    cuda_bricks(const cuda_facts& facts, scene& model, const voxelize_request& request, voxelize_stats& stats,
+                vp::stage_times& times)
+        : gpu_(facts, request, stats) {
+        gpu_.backend().times = &times;
+        gpu_.run([&] {
+            pipeline_ = std::make_unique<sparse_pipeline<vp::cuda_backend>>(gpu_.backend(), model, request, stats);
+        });
+    }
+    ~cuda_bricks() override {
+        gpu_.run([&] { pipeline_.reset(); });
+    }
+
+    sparse_volume run(const voxelpipe::grid& whole) override {
+        return drawn([&] { return pipeline_->run(whole); });
+    }
+    sparse_volume surface(const voxelpipe::grid& whole) override {
+        return drawn([&] { return pipeline_->surface(whole); });
+    }
+    sparse_volume occupied(const voxelpipe::grid& whole) override {
+        return drawn([&] { return pipeline_->occupied(whole); });
+    }
+    sparse_volume walls(const voxelpipe::grid& whole) override {
+        return drawn([&] { return pipeline_->walls(whole); });
+    }
+
+private:
+    template <class Work>
+    sparse_volume drawn(const Work& work) {
+        sparse_volume bricks;
+        gpu_.run([&] { bricks = work(); });
+        return bricks;
+    }
+
+    one_gpu gpu_;
+    std::unique_ptr<sparse_pipeline<vp::cuda_backend>> pipeline_;
+};
+
 } // namespace
+
+std::unique_ptr<brick_drawer> bricks_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
+                                             voxelize_stats& stats, vp::stage_times& times) {
+    return std::make_unique<cuda_bricks>(facts, model, request, stats, times);
+}
+
+volume distances_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
+                         voxelize_stats& stats) {
+    one_gpu gpu(facts, request, stats);
+    volume result;
+    gpu.run([&] { result = draw_distances(gpu.backend(), model, request, stats); });
+    return result;
+}
+
+surface_mesh remeshed_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
+                              voxelize_stats& stats) {
+    one_gpu gpu(facts, request, stats);
+    surface_mesh result;
+    gpu.run([&] { result = remesh_scene(gpu.backend(), model, request, stats); });
+    return result;
+}
 
 volume run_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request, voxelize_stats& stats) {
     std::vector<int> ordinals;
     for (int i = 0; i < (request.devices != 0 ? request.devices : facts.devices); ++i) ordinals.push_back(i);
-    std::vector<limited_memory> memory(ordinals.size(),
-                                       limited_memory{request.device_memory != 0 ? request.device_memory : UINT64_MAX});
+    std::vector<limited_memory> memory(ordinals.size(), memory_of(request));
     slabs::devices gpus(ordinals);
     for (std::size_t i = 0; i < gpus.size(); ++i) gpus.backend(i).resource = memory[i];
     vp::cuda_backend& first = gpus.backend(0);
@@ -122,13 +238,7 @@ volume run_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request
         return result;
     } catch (const std::bad_alloc&) {
         if (refused() == 0) throw;
-        throw device_memory_error(
-            "the GPU has too little memory: at least " + std::to_string(refused() >> 20) +
-            " MiB are needed, and of the " + std::to_string(facts.total_memory >> 20) + " MiB of the " + facts.name +
-            ' ' + std::to_string(facts.free_memory >> 20) + " MiB were free" +
-            (request.device_memory != 0
-                 ? ", " + std::to_string(request.device_memory >> 20) + " MiB of them for this program"
-                 : std::string()));
+        throw too_little_memory(facts, request, refused());
     }
 }
 

@@ -5,13 +5,21 @@
 // pipeline on it. Defined in cuda_device.cu and cuda_look.cu where the program is built with CUDA, in no_cuda.cpp where
 // it is not.
 
+#include "model/surface_mesh.hpp"
+#include "sparse/brick_drawer.hpp"
 #include "voxelizer.hpp"
+
+#include <voxelpipe/stage_times.hpp>
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <future>
+#include <memory>
+#include <optional>
 #include <string>
 #include <thread>
+#include <type_traits>
 #include <vector>
 
 namespace voxelize {
@@ -83,5 +91,46 @@ struct device_memory_error : memory_error {
 // the CPU can take over where this throws device_memory_error.
 [[nodiscard]] volume run_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
                                  voxelize_stats& stats);
+
+// The scene in the first GPU's memory, to be drawn into bricks. All that is given is referred to; the scene stays
+// whole. The drawer adds to the times and puts the GPU's memory and strategy into the counts; its members throw
+// device_memory_error, too.
+[[nodiscard]] std::unique_ptr<brick_drawer> bricks_on_cuda(const cuda_facts& facts, scene& model,
+                                                           const voxelize_request& request, voxelize_stats& stats,
+                                                           voxelpipe::stage_times& times);
+
+// What --distance and --remesh ask for, on the first GPU. The scene stays whole; device_memory_error as above.
+[[nodiscard]] volume distances_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
+                                       voxelize_stats& stats);
+[[nodiscard]] surface_mesh remeshed_on_cuda(const cuda_facts& facts, scene& model, const voxelize_request& request,
+                                            voxelize_stats& stats);
+
+// The GPU, where it can be used and, for the backend `automatic`, is the quicker way; stats.no_cuda says why not. Adds
+// the time that its start takes. Throws backend_error where the request insists on a GPU.
+[[nodiscard]] std::optional<cuda_facts> usable_cuda(const scene& model, const voxelize_request& request, bool in_bricks,
+                                                    voxelize_stats& stats);
+
+// For a device's memory that does not suffice: throws memory_error where the request insists on a GPU, otherwise adds a
+// warning that the CPU does the work.
+void fall_back_on_cpu(const device_memory_error& error, const voxelize_request& request, voxelize_stats& stats);
+
+// draw(facts, request) on the GPU, with the working memory that suits it. None where usable_cuda() gives none, and
+// where its memory does not suffice: the scene has stayed whole, and the CPU is to draw it.
+template <class Draw>
+auto draw_on_cuda(const scene& model, voxelize_request request, bool in_bricks, voxelize_stats& stats, const Draw& draw)
+    -> std::optional<std::invoke_result_t<const Draw&, const cuda_facts&, const voxelize_request&>> {
+    const std::optional<cuda_facts> facts = usable_cuda(model, request, in_bricks, stats);
+    if (!facts) return std::nullopt;
+    const voxelize_stats before = stats;
+    try {
+        if (const std::string why = why_too_large(*facts, model, request); !why.empty()) throw device_memory_error(why);
+        if (request.work_memory == 0) request.work_memory = default_work_memory(*facts);
+        return draw(*facts, request);
+    } catch (const device_memory_error& error) {
+        stats = before;
+        fall_back_on_cpu(error, request, stats);
+        return std::nullopt;
+    }
+}
 
 } // namespace voxelize

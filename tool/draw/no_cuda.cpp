@@ -13,4 +13,17 @@ volume run_on_cuda(const cuda_facts& facts, scene&, const voxelize_request&, vox
     throw backend_error(why_not(facts));
 }
 
+volume distances_on_cuda(const cuda_facts& facts, scene&, const voxelize_request&, voxelize_stats&) {
+    throw backend_error(why_not(facts));
+}
+
+surface_mesh remeshed_on_cuda(const cuda_facts& facts, scene&, const voxelize_request&, voxelize_stats&) {
+    throw backend_error(why_not(facts));
+}
+
+std::unique_ptr<brick_drawer> bricks_on_cuda(const cuda_facts& facts, scene&, const voxelize_request&, voxelize_stats&,
+                                             voxelpipe::stage_times&) {
+    throw backend_error(why_not(facts));
+}
+
 } // namespace voxelize

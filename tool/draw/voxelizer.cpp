@@ -228,53 +228,6 @@ volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats)
     return result;
 }
 
-// The GPU, where it can be used: stats.no_cuda says why where it cannot.
-std::optional<volume> try_cuda(scene& model, voxelize_request request, voxelize_stats& stats) {
-    const auto start = std::chrono::steady_clock::now();
-    // The user has chosen how a GPU draws, or how many draw.
-    const bool is_forced = request.strategy != voxelpipe::strategy::automatic || request.devices != 1;
-    if (request.backend == backend_choice::automatic && !is_forced && built_with_cuda()) {
-        const work_size work = work_of(request, static_cast<double>(model.triangle_count() + model.line_count()),
-                                       static_cast<double>(input_bytes(model)));
-        const double on_cpu = cpu_milliseconds(work, thread_count(request.threads));
-        const double on_cuda = cuda_milliseconds(work, request.cuda ? request.cuda->milliseconds_ago() : 0);
-        stats.estimate = in_words(on_cpu, on_cuda);
-        if (on_cpu <= on_cuda) {
-            stats.no_cuda = "the CPU is quicker here: " + stats.estimate;
-            return std::nullopt;
-        }
-    }
-    const cuda_facts facts = request.cuda ? request.cuda->facts() : look_for_cuda();
-    stats.no_cuda = why_not(facts);
-    if (!stats.no_cuda.empty()) {
-        if (is_forced)
-            throw backend_error((request.devices != 1 ? std::string("--devices")
-                                                      : std::string("--strategy ") + to_string(request.strategy)) +
-                                " needs a GPU: " + stats.no_cuda);
-        if (request.backend == backend_choice::cuda)
-            throw backend_error("--backend cuda: " + stats.no_cuda + "; use --backend cpu");
-        return std::nullopt;
-    }
-    if (request.devices > facts.devices)
-        throw backend_error("--devices " + std::to_string(request.devices) + ": the NVIDIA driver shows " +
-                            std::to_string(facts.devices));
-    const voxelize_stats before = stats;
-    try {
-        if (const std::string why = why_too_large(facts, model, request); !why.empty()) throw device_memory_error(why);
-        const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - start;
-        stats.milliseconds.emplace_back("cuda_start", time.count());
-        if (request.work_memory == 0) request.work_memory = default_work_memory(facts);
-        return run_on_cuda(facts, model, request, stats);
-    } catch (const device_memory_error& error) {
-        if (request.backend == backend_choice::cuda || is_forced)
-            throw memory_error(std::string("--backend cuda: ") + error.what() + "; use --backend cpu");
-        stats = before;
-        stats.no_cuda = error.what();
-        stats.warnings.push_back(stats.no_cuda + "; the CPU does the work");
-        return std::nullopt;
-    }
-}
-
 volume with_ring(volume inside, const voxelize_request& request) {
     volume result = padded(std::move(inside), request.padding);
     for (std::size_t axis = 0; axis < 3; ++axis) // without the rounding of a way there and back
@@ -346,7 +299,10 @@ volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_st
                             " is drawn on the CPU alone",
                         stats);
         if (request.backend != backend_choice::cpu && !only_cpu)
-            if (std::optional<volume> result = try_cuda(model, inside, stats))
+            if (std::optional<volume> result = draw_on_cuda(model, inside, false, stats,
+                                                            [&](const cuda_facts& facts, const voxelize_request& how) {
+                                                                return run_on_cuda(facts, model, how, stats);
+                                                            }))
                 return with_ring(std::move(*result), request);
         return with_ring(run_on_cpu(model, inside, stats), request);
     } catch (const std::bad_alloc&) {

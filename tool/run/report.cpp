@@ -103,6 +103,9 @@ void print_text(std::ostream& stream, const run_report& report) {
     stream << '\n';
     if (!report.request.remesh)
         line(report.request.distance ? "samples in band" : "voxels") << report.stats.voxels << '\n';
+    if (report.bricks != 0)
+        line("bricks") << report.bricks << " with a voxel, " << std::fixed << std::setprecision(1)
+                       << static_cast<double>(report.brick_bytes) / (1 << 20) << " MiB\n";
     if (report.surface) {
         const voxelpipe::surface_counters& c = report.surface->counts;
         line("mesh") << c.vertices << " vertices, " << c.faces << " faces, " << c.components
@@ -244,6 +247,10 @@ void print_json(std::ostream& stream, const run_report& report) {
     root["fragments"] = report.stats.fragments;
     root["fragments_discarded"] = report.stats.fragments_discarded;
     root["voxels"] = report.stats.voxels;
+    if (report.bricks != 0) {
+        root["bricks"] = report.bricks;
+        root["brick_bytes"] = report.brick_bytes;
+    }
     if (report.stats.normals_cancelled != 0) root["normals_cancelled"] = report.stats.normals_cancelled;
     for (const auto& [stage, time] : report.stats.milliseconds) root["ms"][stage] = time;
     root["ms"]["total"] = sum_of_stages(report);

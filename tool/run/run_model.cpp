@@ -42,8 +42,7 @@ double milliseconds_since(clock::time_point start) {
 
 // CUDA, starting already where it will be used or may be.
 std::shared_ptr<cuda_start> start_cuda(const command_line& options) {
-    if (!built_with_cuda() || options.voxelize.backend == backend_choice::cpu || options.voxelize.distance ||
-        options.voxelize.remesh || options.voxelize.wants_cells())
+    if (!built_with_cuda() || options.voxelize.backend == backend_choice::cpu || options.voxelize.wants_cells())
         return nullptr;
     std::error_code error;
     const std::uintmax_t bytes = std::filesystem::file_size(options.input, error);

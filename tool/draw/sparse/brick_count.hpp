@@ -5,30 +5,47 @@
 // Looks at an uploaded scene before it is drawn into bricks: what its surface comes to.
 
 #include "brick_need.hpp"
+#include "draw/surface.hpp"
+#include "model/parallel.hpp"
+#include "model/scene.hpp"
 
 #include <voxelpipe/voxelpipe.hpp>
 
-#include <bitset>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <span>
-#include <utility>
+#include <vector>
 
 namespace voxelize {
 
-// The surface in the request's part of the grid, which the scene was uploaded for.
+// Adds triangles, whose corner i lies at(i) in voxels of the part. Sums are of blocks, so no number of threads shows.
+template <class Triangles, class At>
+void add_triangles(surface_layers& to, const voxelpipe::grid& part, const Triangles& triangles, const At& at,
+                   int threads) {
+    constexpr std::size_t block = 1 << 16;
+    const std::size_t count = triangles.size();
+    std::vector<surface_layers> sums((count + block - 1) / block, surface_layers(part));
+    parallel_for(sums.size(), threads, [&](std::size_t b) {
+        for (std::size_t i = b * block; i < std::min(count, (b + 1) * block); ++i) {
+            const glm::uvec3 t = triangles[i];
+            sums[b].add_triangle(at(t.x), at(t.y), at(t.z));
+        }
+    });
+    for (const surface_layers& sum : sums) to.add(sum);
+}
+
+// The surface in the request's part of the grid, which the scene was uploaded for, into memory that the host reads.
 template <class Uploaded>
-[[nodiscard]] surface_layers surface_of(const Uploaded& scene) {
+[[nodiscard]] surface_layers surface_of(const Uploaded& scene, int threads) {
     const voxelpipe::grid part = scene.relative_grid();
     surface_layers surface(part);
     const glm::dvec3 corner = part.origin / part.voxel_size + glm::dvec3(part.offset);
     const auto in_voxels = [&](const glm::vec3& p) { return glm::dvec3(p) / part.voxel_size - corner; };
     for (const auto& d : scene.bits_draws())
-        for (std::uint64_t copy = 0; copy < d.mesh.copies.count; ++copy) {
-            const auto at = [&](unsigned i) { return in_voxels(d.vertex_shader.places[copy](d.mesh.positions[i])); };
-            for (const glm::uvec3& t : d.mesh.triangles) surface.add_triangle(at(t.x), at(t.y), at(t.z));
-        }
+        for (std::uint64_t copy = 0; copy < d.mesh.copies.count; ++copy)
+            add_triangles(
+                surface, part, d.mesh.triangles,
+                [&](unsigned i) { return in_voxels(d.vertex_shader.places[copy](d.mesh.positions[i])); }, threads);
     for (const auto& d : scene.line_draws())
         for (std::uint64_t copy = 0; copy < d.mesh.copies.count; ++copy) {
             const auto at = [&](std::size_t i) {
@@ -39,23 +56,20 @@ template <class Uploaded>
     return surface;
 }
 
-// What the triangles touch of a grid, counted without keeping it; none if that did not work. Framebuffer: a sparse one
-// whose first target is a bit.
-template <class Framebuffer, class Backend, class Uploaded>
-[[nodiscard]] std::optional<brick_counts> count_touched(Backend& backend, const Uploaded& scene,
-                                                        const voxelpipe::grid& g, voxelpipe::coverage rule) {
-    std::bitset<2> enabled;
-    enabled[0] = true;
-    Framebuffer framebuffer(backend, g.extent, enabled);
-    framebuffer.limit({0, 0});
-    const auto times = std::exchange(backend.times, nullptr);
-    const auto& draws = scene.bits_draws();
-    const voxelpipe::status status =
-        voxelpipe::voxelize(backend, std::span(draws), g, framebuffer, voxelpipe::voxelize_options{rule});
-    backend.times = times;
-    if (status.ok()) return brick_counts{};
-    if (status.code != voxelpipe::status_code::capacity_exceeded) return std::nullopt;
-    return brick_counts{static_cast<double>(status.required.bricks), static_cast<double>(status.required.voxels)};
+// The surface of a scene in PART, a grid that is relative to `reference`; its lines too, with `with_lines`.
+[[nodiscard]] inline surface_layers surface_of(const scene& model, const voxelpipe::grid& part,
+                                               const glm::dvec3& reference, bool with_lines, int threads) {
+    surface_layers surface(part);
+    const glm::dvec3 corner = part.origin / part.voxel_size + glm::dvec3(part.offset);
+    for (const instance& shown : model.instances) {
+        const primitive& of = model.primitives[shown.primitive];
+        const placed_vertex_shader place(shown.to_world, reference);
+        const auto at = [&](std::uint32_t i) { return glm::dvec3(place(of.positions[i])) / part.voxel_size - corner; };
+        add_triangles(surface, part, of.triangles, at, threads);
+        if (!with_lines) continue;
+        for (const glm::uvec2& l : of.lines) surface.add_line(at(l.x), at(l.y));
+    }
+    return surface;
 }
 
 } // namespace voxelize

@@ -65,6 +65,13 @@ void surface_layers::add_triangle(const glm::dvec3& a, const glm::dvec3& b, cons
         std::max({a.z, b.z, c.z}));
 }
 
+void surface_layers::add(const surface_layers& other) {
+    for (std::size_t n = 0; n < layers_.size(); ++n) layers_[n] += other.layers_[n];
+    voxels_ += other.voxels_;
+    volume_ += other.volume_;
+    primitives_ += other.primitives_;
+}
+
 void surface_layers::add_line(const glm::dvec3& a, const glm::dvec3& b) {
     add(1 + std::abs(b.x - a.x) + std::abs(b.y - a.y) + std::abs(b.z - a.z), std::min(a.z, b.z), std::max(a.z, b.z));
 }

@@ -22,6 +22,8 @@ public:
     // Corners in voxels of the part.
     void add_triangle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);
     void add_line(const glm::dvec3& a, const glm::dvec3& b);
+    // Another surface in the same part.
+    void add(const surface_layers& other);
 
     [[nodiscard]] double voxels() const { return voxels_; }
     // The voxels of each layer of the part, lowest first.

@@ -3,18 +3,18 @@
 #pragma once
 
 // The tool's pipeline into a sparse framebuffer: the draws, targets and values of pipeline.hpp, resolved voxel by voxel
-// that exists, for a backend in host memory. Slab by slab, so that the sums of colours are held for one slab at a time.
-// A solid is drawn after its surface, the whole grid in one call. The request may be changed between calls to another
-// crop of its grid, with what that needs.
+// that exists. Slab by slab, so that the sums of colours are held for one slab at a time. A solid is drawn after its
+// surface, the whole grid in one call. The request may be changed between calls to another crop of its grid, with what
+// that needs. Instantiated for cpu_backend in sparse_voxelizer.cpp and for cuda_backend by cuda_pipeline.cuh; a file
+// that instantiates the parts that draw includes sparse_parts.hpp.
 
 #include "brick_count.hpp"
+#include "brick_drawer.hpp"
 #include "brick_need.hpp"
 #include "draw/pipeline_solid.hpp"
 #include "draw/pipeline_surface.hpp"
 #include "model/memory.hpp"
 #include "model/sparse_volume.hpp"
-#include "sparse_outside.hpp"
-#include "sparse_solid.hpp"
 
 #include <algorithm>
 #include <bitset>
@@ -29,49 +29,32 @@
 namespace voxelize {
 
 template <class Backend>
-class sparse_pipeline : pipeline<Backend> {
+class sparse_pipeline : pipeline<Backend>, public brick_drawer {
     using base = pipeline<Backend>;
-    static_assert(memory_access<Backend>::on_host);
 
 public:
-    using base::base;
+    // As pipeline has it. A backend that is not in host memory leaves the scene as it is, which this reads, too.
+    sparse_pipeline(Backend& backend, scene& model, const voxelize_request& request, voxelize_stats& stats)
+        : base(backend, model, request, stats), model_{model} {}
 
-    // `padding` layers of `whole`, which the request's grid is a part of, hold nothing.
-    [[nodiscard]] sparse_volume run(const voxelpipe::grid& whole) {
+    [[nodiscard]] sparse_volume run(const voxelpipe::grid& whole) override {
         require_part();
         sparse_volume result = surface_in(whole, this->num_passes());
         if (!this->request_.solid) return result;
         report_from(this->num_passes() - 1, this->num_passes(), 0, 1);
         return draw_solid(std::move(result));
     }
-    // Without the solid.
-    [[nodiscard]] sparse_volume surface(const voxelpipe::grid& whole) {
+    [[nodiscard]] sparse_volume surface(const voxelpipe::grid& whole) override {
         return surface_in(whole, this->num_passes() - (this->request_.solid ? 1 : 0));
     }
-    // The voxels that the surface occupies, without channels.
-    [[nodiscard]] sparse_volume occupied(const voxelpipe::grid& whole) {
+    [[nodiscard]] sparse_volume occupied(const voxelpipe::grid& whole) override {
         if (!this->uploaded_->has_masks() && !this->draws_lines_) return walls(whole);
-        return bricks_of(whole,
-                         [this](const voxelpipe::grid& slab, const vp::sparse_limits& most, sparse_volume& part) {
-                             std::bitset<base::num_targets> enabled;
-                             enabled[base::occupancy] = true;
-                             surface_bricks framebuffer(this->backend_, slab.extent, enabled);
-                             if (!draw_surface_in(slab, framebuffer, enabled, most)) return false;
-                             take_bricks(part, framebuffer);
-                             return true;
-                         });
+        return bricks_of(whole, [this](sparse_volume& part, const voxelpipe::grid& slab,
+                                       const vp::sparse_limits& most) { return draw_occupied(part, slab, most); });
     }
-    // The voxels that triangles touch, whatever masks cut off.
-    [[nodiscard]] sparse_volume walls(const voxelpipe::grid& whole) {
-        return bricks_of(whole,
-                         [this](const voxelpipe::grid& slab, const vp::sparse_limits& most, sparse_volume& part) {
-                             std::bitset<2> enabled;
-                             enabled[0] = true;
-                             bits framebuffer(this->backend_, slab.extent, enabled);
-                             if (!draw_part(this->uploaded_->bits_draws(), slab, framebuffer, most)) return false;
-                             take_bricks(part, framebuffer);
-                             return true;
-                         });
+    [[nodiscard]] sparse_volume walls(const voxelpipe::grid& whole) override {
+        return bricks_of(whole, [this](sparse_volume& part, const voxelpipe::grid& slab,
+                                       const vp::sparse_limits& most) { return draw_walls(part, slab, most); });
     }
 
 private:
@@ -120,18 +103,29 @@ private:
     void require_part() {
         const typename base::stage_timer timer{*this, "estimate"};
         const voxelize_request& request = this->request_;
-        const surface_layers surface = surface_of(*this->uploaded_);
+        const surface_layers& surface = surface_here();
         value_sizes bytes =
             value_sizes_of(request, this->only_bits_ ? (this->counts_fragments() ? 4 : 0.125)
                                                      : static_cast<double>(this->surface_voxel_bytes()));
         if (this->bodies_ && !this->bodies_->is_everywhere()) bytes.bodies = body_map::brick_bytes;
         if (2 * needed_bytes(request, surface, at_most(surface), bytes) < static_cast<double>(memory::room())) return;
         const int side = counted_side(surface);
-        this->backend_.progress = nullptr;
         const std::optional<brick_counts> counted =
-            count_touched<bits>(this->backend_, *this->uploaded_, counted_grid(this->uploaded_->relative_grid(), side),
-                                side == 1 && !request.solid ? request.coverage : voxelpipe::coverage::conservative);
+            count_touched(counted_grid(this->uploaded_->relative_grid(), side),
+                          side == 1 && !request.solid ? request.coverage : voxelpipe::coverage::conservative);
         if (counted) require_bricks(request, needed_bytes(request, surface, counts_of(surface, *counted, side), bytes));
+    }
+    // The surface in the request's part of the grid, which is looked at once for each part.
+    [[nodiscard]] const surface_layers& surface_here() {
+        const voxelpipe::grid part = this->uploaded_->relative_grid();
+        if (surface_ && part.offset == surface_part_.offset && part.extent == surface_part_.extent) return *surface_;
+        surface_part_ = part;
+        const int threads = thread_count(this->request_.threads);
+        if constexpr (memory_access<Backend>::on_host)
+            return surface_.emplace(surface_of(*this->uploaded_, threads));
+        else
+            return surface_.emplace(
+                surface_of(model_, part, this->uploaded_->reference(), this->draws_lines_, threads));
     }
     // As many slabs as keep within the working memory at `bytes_of_voxel` a voxel; a slab that does not is halved, down
     // to a tile's height. Their borders are borders of bricks. draw(slab, most) returns false, without having done
@@ -145,8 +139,8 @@ private:
                                                    : static_cast<double>(memory::room()) / 4;
         };
         constexpr int tile = 32, brick_area = 64;
-        const double slabs = std::ceil(surface_of(*this->uploaded_).voxels() *
-                                       (bytes_of_voxel + drawn_brick_bytes / brick_area) / work());
+        const double slabs =
+            std::ceil(surface_here().voxels() * (bytes_of_voxel + drawn_brick_bytes / brick_area) / work());
         const auto whole_tiles = [](double depth) { return std::max(1, static_cast<int>(depth / tile)) * tile; };
         int depth = slabs <= 1 ? all.extent.z + tile : whole_tiles(all.extent.z / slabs);
         int drawn = 0;
@@ -170,14 +164,14 @@ private:
         }
         return drawn;
     }
-    // The bricks of the request's part. draw(slab, most, part) as draw_within() has it.
+    // The bricks of the request's part. draw(part, slab, most) as draw_within() has it.
     template <class Draw>
     [[nodiscard]] sparse_volume bricks_of(const voxelpipe::grid& whole, const Draw& draw) {
         std::vector<sparse_volume> parts;
         draw_within(bit_bytes, 0, 1, [&](const voxelpipe::grid& slab, const vp::sparse_limits& most) {
             sparse_volume part;
             part.shape = volume_of(whole);
-            if (!draw(slab, most, part)) return false;
+            if (!draw(part, slab, most)) return false;
             parts.push_back(std::move(part));
             return true;
         });
@@ -206,198 +200,34 @@ private:
         return this->draw_reporting(draws, slab, framebuffer);
     }
 
-    [[nodiscard]] bool draw_bits(sparse_volume& result, const voxelpipe::grid& slab, const vp::sparse_limits& most) {
-        std::bitset<2> enabled;
-        enabled[0] = !this->counts_fragments(); // one target there has to be
-        enabled[1] = this->counts_fragments();
-        bits framebuffer(this->backend_, slab.extent, enabled);
-        if (!draw_part(this->uploaded_->bits_draws(), slab, framebuffer, most)) return false;
-        const typename base::stage_timer timer{*this, "resolve"};
-        take_bricks(result, framebuffer);
-        for (const target wanted : this->request_.targets) {
-            if (wanted == target::occupancy) add_occupancy(result);
-            if (wanted == target::count && this->counts_fragments())
-                copy<1, std::uint32_t>(result, wanted, framebuffer);
-            if (wanted == target::color_outer) add_unset(result, wanted);
-        }
-        return true;
-    }
+    // ---- parts that draw (sparse_parts.hpp) ------------------------------------------------------------------------
 
-    // False as draw_part().
+    // These return false as draw_part().
+    [[nodiscard]] bool draw_walls(sparse_volume& result, const voxelpipe::grid& slab, const vp::sparse_limits& most);
+    [[nodiscard]] bool draw_bits(sparse_volume& result, const voxelpipe::grid& slab, const vp::sparse_limits& most);
+    [[nodiscard]] bool draw_occupied(sparse_volume& result, const voxelpipe::grid& slab, const vp::sparse_limits& most);
+    [[nodiscard]] bool draw_surface(sparse_volume& result, const voxelpipe::grid& slab, const vp::sparse_limits& most);
     [[nodiscard]] bool draw_surface_in(const voxelpipe::grid& slab, surface_bricks& framebuffer,
                                        std::bitset<base::num_targets> enabled, const vp::sparse_limits& most) {
         return draw_part(this->uploaded_->draws(), slab, framebuffer, most) &&
                this->draw_lines(this->uploaded_->line_draws(), slab, framebuffer, enabled);
     }
-
-    [[nodiscard]] bool draw_surface(sparse_volume& result, const voxelpipe::grid& slab, const vp::sparse_limits& most) {
-        auto enabled = this->enabled_targets();
-        if (enabled.count() > 1) enabled[base::occupancy] = false;
-        surface_bricks framebuffer(this->backend_, slab.extent, enabled);
-        if (enabled[base::triangle]) vp::get<base::triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
-        if (!draw_surface_in(slab, framebuffer, enabled, most)) return false;
-        const typename base::stage_timer timer{*this, "resolve"};
-        take_bricks(result, framebuffer);
-        for (const target wanted : this->request_.targets) {
-            switch (wanted) {
-            case target::occupancy:
-                add_occupancy(result);
-                break;
-            case target::count:
-                if (!this->counts_fragments()) break;
-                copy<base::count, std::uint32_t>(result, wanted, framebuffer);
-                break;
-            case target::color:
-                resolve<glm::u8vec4>(result, wanted,
-                                     mean_color{values_of<base::color_sum>(framebuffer),
-                                                values_of<base::count>(framebuffer), this->uploaded_->tables()});
-                break;
-            case target::color_max:
-                copy<base::color_max, glm::u8vec4>(result, wanted, framebuffer);
-                break;
-            case target::color_replace:
-                copy<base::color_last, glm::u8vec4>(result, wanted, framebuffer);
-                break;
-            case target::color_outer:
-                add_unset(result, wanted);
-                break;
-            case target::normal:
-                resolve<glm::vec3>(result, wanted, unit_normal{values_of<base::normal_sum>(framebuffer)});
-                break;
-            case target::material:
-                resolve<std::int32_t>(result, wanted,
-                                      material_of_triangle{values_of<base::triangle>(framebuffer),
-                                                           this->uploaded_->draw_table(),
-                                                           this->uploaded_->num_draws()});
-                break;
-            case target::triangle:
-                copy<base::triangle, std::uint32_t>(result, wanted, framebuffer);
-                break;
-            case target::depth:
-                copy<base::depth, float>(result, wanted, framebuffer);
-                break;
-            case target::distance: // those of --distance alone, which draws no bricks
-            case target::nearest:
-            case target::fraction: // of dense grids alone
-            case target::area_vector:
-            case target::area:
-            case target::centroid:
-            case target::aperture_x:
-            case target::aperture_y:
-            case target::aperture_z:
-                break;
-            }
-        }
-        return true;
-    }
-
+    // The bricks and voxels that triangles touch of a grid, counted without keeping them; none if that did not work.
+    [[nodiscard]] std::optional<brick_counts> count_touched(const voxelpipe::grid& g, voxelpipe::coverage rule);
     // Fills the channel of color-outer, once all voxels of the request's part are known.
-    void draw_outer(sparse_volume& result, int passes) {
-        const voxelize_stats counted = this->stats_; // the same fragments again
-        const voxelpipe::grid all = this->uploaded_->relative_grid();
-        const auto columns = [](int a, int b) { return static_cast<std::size_t>(a) * static_cast<std::size_t>(b); };
-        column_table along_z{all.offset, all.extent, {}};
-        if (this->request_.columns == nullptr) {
-            const typename base::stage_timer timer{*this, "outside"};
-            along_z.along[2].resize(columns(all.extent.x, all.extent.y));
-            add_columns(result, along_z);
-        }
-        this->make_outer_draws();
-        channel& colors = *std::find_if(result.channels.begin(), result.channels.end(),
-                                        [](const channel& c) { return c.name == info_of(target::color_outer).name; });
-        draw_within(2 * sizeof(std::uint64_t) + sizeof(glm::u8vec4), 1, passes,
-                    [&](const voxelpipe::grid& slab, const vp::sparse_limits& most) {
-                        column_table ends{slab.offset, slab.extent, {}};
-                        ends.along[0].resize(columns(slab.extent.y, slab.extent.z));
-                        ends.along[1].resize(columns(slab.extent.x, slab.extent.z));
-                        {
-                            const typename base::stage_timer timer{*this, "outside"};
-                            add_columns(result, ends);
-                        }
-                        column_view view = ends.view();
-                        view.along[2] =
-                            this->request_.columns != nullptr ? this->request_.columns : along_z.along[2].data();
-                        this->set_columns(view);
-                        std::bitset<1> enabled;
-                        enabled.set();
-                        outer_bricks framebuffer(this->backend_, slab.extent, enabled);
-                        if (!draw_part(this->outer_draws_, slab, framebuffer, most) ||
-                            !this->draw_lines(this->outer_line_draws_, slab, framebuffer, enabled))
-                            return false;
-                        const typename base::stage_timer timer{*this, "resolve"};
-                        sparse_volume part;
-                        take_bricks(part, framebuffer);
-                        resolve<glm::u8vec4>(part, target::color_outer, outer_color{values_of<0>(framebuffer)});
-                        put_values(part, part.channels.front(), result, colors);
-                        return true;
-                    });
-        this->restore_counts(counted);
-    }
-
+    void draw_outer(sparse_volume& result, int passes);
+    [[nodiscard]] bool draw_outer_in(const voxelpipe::grid& slab, const vp::sparse_limits& most, sparse_volume& part);
+    // The solid's bits in a part of the grid, with the counts of bodies where these are asked for.
+    [[nodiscard]] vp::status draw_solid_bits(const voxelpipe::grid& part, sparse_volume& result, channel& counts);
     // The solid's bricks and tiles, and the values of the surface where that lies in them: in bricks.
-    [[nodiscard]] sparse_volume draw_solid(sparse_volume&& surface_of) {
-        // The outside follows from the whole grid: a flood is drawn there, with the padding, or has been before.
-        const bool is_flood = this->request_.solid->rule == solid_rule::exterior;
-        const voxelpipe::grid wanted_part = this->uploaded_->relative_grid();
-        const voxelpipe::grid part =
-            is_flood && this->request_.solid->slab == nullptr ? wanted_part.uncropped() : wanted_part;
-        std::bitset<2> enabled;
-        enabled[0] = !this->counts_bodies();
-        enabled[1] = this->counts_bodies();
-        bits framebuffer(this->backend_, part.extent, enabled);
-        vp::status status;
-        {
-            const typename base::stage_timer timer{*this, "voxelize"};
-            this->backend_.progress = [this](std::uint64_t done, std::uint64_t total) {
-                this->report_(total == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(total));
-            };
-            status = vp::voxelize_solid(this->backend_, this->uploaded_->bits_draws(), part, framebuffer,
-                                        solid_options_of(*this->request_.solid));
-        }
-        this->add_solid_counts(status, wanted_part);
-        const typename base::stage_timer timer{*this, "fill"};
-        sparse_volume result;
-        result.shape = surface_of.shape;
-        take_bricks(result, framebuffer);
-        // Counts of several bodies make no tiles, so all counts are 1 where there are tiles, which may be opened or
-        // cut.
-        const bool has_counts = this->counts_bodies() && result.tiles.empty();
-        if (!surface_of.keys.empty() && !result.tiles.empty()) result = open_tiles(result, &surface_of.keys);
-        if (part.extent != wanted_part.extent)
-            keep_part(result, wanted_part.offset, wanted_part.extent);
-        else if (is_flood && wanted_part.offset.x != 0 && !result.tiles.empty()) // as without slabs, where it is padded
-            result = open_tiles(result);
-        std::optional<body_map> bodies;
-        if (this->bodies_) bodies.emplace(this->bodies_->find_in(wanted_part));
-        std::vector<fill_values> fills; // by target
-        for (const target wanted : this->request_.targets)
-            fills.push_back(wanted == target::occupancy || wanted == target::count
-                                ? fill_values{}
-                                : fill_of(surface_of, wanted, *this->request_.solid, bodies ? &*bodies : nullptr));
-        if (bodies && !bodies->is_everywhere() && !result.tiles.empty())
-            result = bodies->with_whole_tiles(result, [&](std::uint32_t a, std::uint32_t b) {
-                return std::all_of(fills.begin(), fills.end(),
-                                   [&](const fill_values& f) { return f.of(a) == f.of(b); });
-            });
-        this->warn_of_solid(result.num_voxels(), surface_of.num_voxels());
-        for (std::size_t t = 0; t < fills.size(); ++t) {
-            const target wanted = this->request_.targets[t];
-            if (wanted == target::occupancy)
-                add_occupancy(result);
-            else if (wanted != target::count)
-                add_filled(result, surface_of, info_of(wanted).name, fills[t]);
-            else if (has_counts)
-                copy<1, std::uint32_t>(result, wanted, framebuffer);
-            else
-                resolve<std::uint32_t>(result, wanted, [](std::size_t) { return 1U; });
-        }
-        return result;
-    }
+    [[nodiscard]] sparse_volume draw_solid(sparse_volume&& surface_of);
 
     template <class Framebuffer>
     void take_bricks(sparse_volume& result, const Framebuffer& framebuffer) {
         const auto& from = framebuffer.contents();
-        const auto list = [](const auto& b) { return std::vector(b.data(), b.data() + b.size()); };
+        const auto list = [this](const auto& b) {
+            return memory_access<Backend>::list(this->backend_, b.data(), b.size());
+        };
         result.keys = list(from.keys);
         result.masks = list(from.masks);
         result.offsets = list(from.offsets);
@@ -409,19 +239,35 @@ private:
     }
     // A channel whose values come later.
     void add_unset(sparse_volume& result, target id) {
-        resolve<glm::u8vec4>(result, id, [](std::size_t) { return glm::u8vec4(0); });
+        channel& c = add_channel(result, id);
+        fill_channel(c, result.num_values(), 0);
     }
     static void add_occupancy(sparse_volume& result) { result.channels.push_back({"occupancy", scalar::bit, 1, {}}); }
 
     template <class T, class Value>
     void resolve(sparse_volume& result, target id, const Value& value) {
-        const target_info& info = info_of(id);
-        channel c{std::string(info.name), info.type, info.components, {}};
+        channel& c = add_channel(result, id);
         const auto values = static_cast<std::size_t>(result.num_values());
         c.data.resize(values * sizeof(T));
         memory_access<Backend>::read(this->backend_, reinterpret_cast<T*>(c.data.data()), values, value,
                                      thread_count(this->request_.threads));
-        result.channels.push_back(std::move(c));
+    }
+    // A channel without data.
+    static channel& add_channel(sparse_volume& result, target id) {
+        const target_info& info = info_of(id);
+        return result.channels.emplace_back(channel{std::string(info.name), info.type, info.components, {}});
+    }
+    // A target's values as the data of a channel.
+    template <std::size_t I, class T, class Framebuffer>
+    void copy(channel& to, const Framebuffer& framebuffer, std::uint64_t num_values) {
+        to.data.resize(static_cast<std::size_t>(num_values) * sizeof(T));
+        memory_access<Backend>::read(this->backend_, reinterpret_cast<T*>(to.data.data()),
+                                     static_cast<std::size_t>(num_values), as_it_is<T>{values_of<I>(framebuffer)},
+                                     thread_count(this->request_.threads));
+    }
+    static void fill_channel(channel& to, std::uint64_t num_values, std::uint32_t value) {
+        to.data.resize(static_cast<std::size_t>(num_values) * sizeof(value));
+        std::fill_n(reinterpret_cast<std::uint32_t*>(to.data.data()), num_values, value);
     }
     template <std::size_t I, class T, class Framebuffer>
     void copy(sparse_volume& result, target id, const Framebuffer& framebuffer) {
@@ -434,6 +280,10 @@ private:
         for (std::uint64_t i = 0; i < result.num_voxels(); ++i) cancelled += normals[i] == glm::vec3(0) ? 1 : 0;
         this->report_cancelled_normals(cancelled);
     }
+
+    const scene& model_;
+    std::optional<surface_layers> surface_; // in surface_part_
+    voxelpipe::grid surface_part_;
 };
 
 } // namespace voxelize

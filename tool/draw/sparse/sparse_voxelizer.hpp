@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// scene + options -> sparse volume, on the CPU: the values that run_voxelizer gives, of the voxels that exist.
+// scene + options -> sparse volume: the values that run_voxelizer gives, of the voxels that exist.
 
 #include "draw/voxelizer.hpp"
 #include "model/sparse_volume.hpp"
@@ -37,11 +37,16 @@ struct dense_needs {
 [[nodiscard]] storage_decision choose_storage(storage_choice choice, const voxelize_request& request,
                                               std::span<const std::filesystem::path> outputs, const dense_needs& dense);
 
+struct cuda_facts; // cuda_device.hpp
+
 // Draws parts of a grid from one model, which it keeps. Members throw std::bad_alloc.
 class sparse_drawer {
 public:
     // Consumes the scene. The request is that of the whole grid, or of a part of it.
     sparse_drawer(scene&& model, const voxelize_request& request);
+    // On a GPU that can be used. The scene stays whole and lasts as long as this; members throw device_memory_error,
+    // too.
+    sparse_drawer(scene& model, const voxelize_request& request, const cuda_facts& facts);
     sparse_drawer(const sparse_drawer&) = delete;
     sparse_drawer& operator=(const sparse_drawer&) = delete;
     ~sparse_drawer();
@@ -78,7 +83,8 @@ private:
 // flood's window; the bits once more as words with their places, four times as large. 0 if the request has neither.
 [[nodiscard]] double decided_layer_bytes(const voxelize_request& request);
 
-// Consumes the scene. A flood or a vote whose bits do not fit into the run's memory is drawn in slabs. folder: for
+// Consumes the scene. The backend is chosen as by run_voxelizer. A flood or a vote whose bits do not fit into the run's
+// memory is drawn in slabs, on the CPU. folder: for
 // temporary files. Throws as run_voxelizer does, and write_error for a folder that is full.
 [[nodiscard]] sparse_volume run_sparse_voxelizer(scene&& model, const voxelize_request& request,
                                                  const std::filesystem::path& folder, voxelize_stats& stats);

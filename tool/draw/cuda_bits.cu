@@ -1,8 +1,0 @@
-// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
-// SPDX-License-Identifier: Apache-2.0
-// The tool's pipeline for cuda_backend: the surface's bits and counts.
-#include "cuda_pipeline.cuh"
-
-namespace voxelize {
-VOXELIZE_CUDA_BITS()
-} // namespace voxelize

@@ -1,0 +1,277 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// The parts of the tool's sparse pipeline that draw: the surface, what the sides of the grid see of it, the solid. Part
+// of sparse_pipeline.hpp: a file that instantiates them includes it.
+
+#include "sparse_outside.hpp"
+#include "sparse_pipeline.hpp"
+#include "sparse_solid.hpp"
+
+#include <algorithm>
+#include <bitset>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace voxelize {
+
+template <class Backend>
+bool sparse_pipeline<Backend>::draw_walls(sparse_volume& result, const voxelpipe::grid& slab,
+                                          const vp::sparse_limits& most) {
+    std::bitset<2> enabled;
+    enabled[0] = true;
+    bits framebuffer(this->backend_, slab.extent, enabled);
+    if (!draw_part(this->uploaded_->bits_draws(), slab, framebuffer, most)) return false;
+    take_bricks(result, framebuffer);
+    return true;
+}
+
+template <class Backend>
+std::optional<brick_counts> sparse_pipeline<Backend>::count_touched(const voxelpipe::grid& g,
+                                                                    voxelpipe::coverage rule) {
+    std::bitset<2> enabled;
+    enabled[0] = true;
+    bits framebuffer(this->backend_, g.extent, enabled);
+    framebuffer.limit({0, 0});
+    if constexpr (requires { this->backend_.progress; }) this->backend_.progress = nullptr;
+    const auto times = std::exchange(this->backend_.times, nullptr);
+    const auto& draws = this->uploaded_->bits_draws();
+    const voxelpipe::status status =
+        voxelpipe::voxelize(this->backend_, std::span(draws), g, framebuffer, voxelpipe::voxelize_options{rule});
+    this->backend_.times = times;
+    if (status.ok()) return brick_counts{};
+    if (status.code != voxelpipe::status_code::capacity_exceeded) return std::nullopt;
+    return brick_counts{static_cast<double>(status.required.bricks), static_cast<double>(status.required.voxels)};
+}
+
+template <class Backend>
+bool sparse_pipeline<Backend>::draw_bits(sparse_volume& result, const voxelpipe::grid& slab,
+                                         const vp::sparse_limits& most) {
+    std::bitset<2> enabled;
+    enabled[0] = !this->counts_fragments(); // one target there has to be
+    enabled[1] = this->counts_fragments();
+    bits framebuffer(this->backend_, slab.extent, enabled);
+    if (!draw_part(this->uploaded_->bits_draws(), slab, framebuffer, most)) return false;
+    const typename base::stage_timer timer{*this, "resolve"};
+    take_bricks(result, framebuffer);
+    for (const target wanted : this->request_.targets) {
+        if (wanted == target::occupancy) add_occupancy(result);
+        if (wanted == target::count && this->counts_fragments()) copy<1, std::uint32_t>(result, wanted, framebuffer);
+        if (wanted == target::color_outer) add_unset(result, wanted);
+    }
+    return true;
+}
+
+template <class Backend>
+bool sparse_pipeline<Backend>::draw_occupied(sparse_volume& result, const voxelpipe::grid& slab,
+                                             const vp::sparse_limits& most) {
+    std::bitset<base::num_targets> enabled;
+    enabled[base::occupancy] = true;
+    surface_bricks framebuffer(this->backend_, slab.extent, enabled);
+    if (!draw_surface_in(slab, framebuffer, enabled, most)) return false;
+    take_bricks(result, framebuffer);
+    return true;
+}
+
+template <class Backend>
+bool sparse_pipeline<Backend>::draw_surface(sparse_volume& result, const voxelpipe::grid& slab,
+                                            const vp::sparse_limits& most) {
+    auto enabled = this->enabled_targets();
+    if (enabled.count() > 1) enabled[base::occupancy] = false;
+    surface_bricks framebuffer(this->backend_, slab.extent, enabled);
+    if (enabled[base::triangle]) vp::get<base::triangle>(framebuffer).clear(UINT32_MAX); // as int32: -1
+    if (!draw_surface_in(slab, framebuffer, enabled, most)) return false;
+    const typename base::stage_timer timer{*this, "resolve"};
+    take_bricks(result, framebuffer);
+    for (const target wanted : this->request_.targets) {
+        switch (wanted) {
+        case target::occupancy:
+            add_occupancy(result);
+            break;
+        case target::count:
+            if (!this->counts_fragments()) break;
+            copy<base::count, std::uint32_t>(result, wanted, framebuffer);
+            break;
+        case target::color:
+            resolve<glm::u8vec4>(result, wanted,
+                                 mean_color{values_of<base::color_sum>(framebuffer),
+                                            values_of<base::count>(framebuffer), this->uploaded_->tables()});
+            break;
+        case target::color_max:
+            copy<base::color_max, glm::u8vec4>(result, wanted, framebuffer);
+            break;
+        case target::color_replace:
+            copy<base::color_last, glm::u8vec4>(result, wanted, framebuffer);
+            break;
+        case target::color_outer:
+            add_unset(result, wanted);
+            break;
+        case target::normal:
+            resolve<glm::vec3>(result, wanted, unit_normal{values_of<base::normal_sum>(framebuffer)});
+            break;
+        case target::material:
+            resolve<std::int32_t>(result, wanted,
+                                  material_of_triangle{values_of<base::triangle>(framebuffer),
+                                                       this->uploaded_->draw_table(), this->uploaded_->num_draws()});
+            break;
+        case target::triangle:
+            copy<base::triangle, std::uint32_t>(result, wanted, framebuffer);
+            break;
+        case target::depth:
+            copy<base::depth, float>(result, wanted, framebuffer);
+            break;
+        case target::distance: // those of --distance alone, which draws no bricks
+        case target::nearest:
+        case target::fraction: // of dense grids alone
+        case target::area_vector:
+        case target::area:
+        case target::centroid:
+        case target::aperture_x:
+        case target::aperture_y:
+        case target::aperture_z:
+            break;
+        }
+    }
+    return true;
+}
+
+template <class Backend>
+bool sparse_pipeline<Backend>::draw_outer_in(const voxelpipe::grid& slab, const vp::sparse_limits& most,
+                                             sparse_volume& part) {
+    std::bitset<1> enabled;
+    enabled.set();
+    outer_bricks framebuffer(this->backend_, slab.extent, enabled);
+    if (!draw_part(this->outer_draws_, slab, framebuffer, most) ||
+        !this->draw_lines(this->outer_line_draws_, slab, framebuffer, enabled))
+        return false;
+    const typename base::stage_timer timer{*this, "resolve"};
+    take_bricks(part, framebuffer);
+    resolve<glm::u8vec4>(part, target::color_outer, outer_color{values_of<0>(framebuffer)});
+    return true;
+}
+
+template <class Backend>
+void sparse_pipeline<Backend>::draw_outer(sparse_volume& result, int passes) {
+    const voxelize_stats counted = this->stats_; // the same fragments again
+    const voxelpipe::grid all = this->uploaded_->relative_grid();
+    const auto columns = [](int a, int b) { return static_cast<std::size_t>(a) * static_cast<std::size_t>(b); };
+    column_table along_z{all.offset, all.extent, {}};
+    if (this->request_.columns == nullptr) {
+        const typename base::stage_timer timer{*this, "outside"};
+        along_z.along[2].resize(columns(all.extent.x, all.extent.y));
+        add_columns(result, along_z);
+    }
+    std::vector<typename base::template buffer<column_ends>>
+        put; // where the draws read them, of the whole part and of a slab
+    const auto ends_of = [&](const column_ends* ends, std::size_t count) {
+        if constexpr (memory_access<Backend>::on_host)
+            return ends;
+        else
+            return static_cast<const column_ends*>(
+                put.emplace_back(this->backend_, std::vector(ends, ends + count)).data());
+    };
+    const column_ends* const ends_along_z =
+        ends_of(this->request_.columns != nullptr ? this->request_.columns : along_z.along[2].data(),
+                columns(all.extent.x, all.extent.y));
+    const std::size_t num_kept = put.size();
+    this->make_outer_draws();
+    channel& colors = *std::find_if(result.channels.begin(), result.channels.end(),
+                                    [](const channel& c) { return c.name == info_of(target::color_outer).name; });
+    draw_within(2 * sizeof(std::uint64_t) + sizeof(glm::u8vec4), 1, passes,
+                [&](const voxelpipe::grid& slab, const vp::sparse_limits& most) {
+                    column_table ends{slab.offset, slab.extent, {}};
+                    ends.along[0].resize(columns(slab.extent.y, slab.extent.z));
+                    ends.along[1].resize(columns(slab.extent.x, slab.extent.z));
+                    {
+                        const typename base::stage_timer timer{*this, "outside"};
+                        add_columns(result, ends);
+                    }
+                    column_view view = ends.view();
+                    put.erase(put.begin() + static_cast<std::ptrdiff_t>(num_kept), put.end());
+                    for (const std::size_t a : {0, 1})
+                        view.along[a] = ends_of(ends.along[a].data(), ends.along[a].size());
+                    view.along[2] = ends_along_z;
+                    this->set_columns(view);
+                    sparse_volume part;
+                    if (!draw_outer_in(slab, most, part)) return false;
+                    put_values(part, part.channels.front(), result, colors);
+                    return true;
+                });
+    this->restore_counts(counted);
+}
+
+template <class Backend>
+vp::status sparse_pipeline<Backend>::draw_solid_bits(const voxelpipe::grid& part, sparse_volume& result,
+                                                     channel& counts) {
+    std::bitset<2> enabled;
+    enabled[0] = !this->counts_bodies();
+    enabled[1] = this->counts_bodies();
+    bits framebuffer(this->backend_, part.extent, enabled);
+    vp::status status;
+    {
+        const typename base::stage_timer timer{*this, "voxelize"};
+        if constexpr (requires { this->backend_.progress; })
+            this->backend_.progress = [this](std::uint64_t done, std::uint64_t total) {
+                this->report_(total == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(total));
+            };
+        status = vp::voxelize_solid(this->backend_, this->uploaded_->bits_draws(), part, framebuffer,
+                                    solid_options_of(*this->request_.solid));
+    }
+    if (!status.ok()) return status;
+    const typename base::stage_timer timer{*this, "fill"};
+    take_bricks(result, framebuffer);
+    // Counts of several bodies make no tiles, so all counts are 1 where there are tiles, which may be opened or cut.
+    if (this->counts_bodies() && result.tiles.empty()) copy<1, std::uint32_t>(counts, framebuffer, result.num_values());
+    return status;
+}
+
+template <class Backend>
+sparse_volume sparse_pipeline<Backend>::draw_solid(sparse_volume&& surface_of) {
+    // The outside follows from the whole grid: a flood is drawn there, with the padding, or has been before.
+    const bool is_flood = this->request_.solid->rule == solid_rule::exterior;
+    const voxelpipe::grid wanted_part = this->uploaded_->relative_grid();
+    const voxelpipe::grid part =
+        is_flood && this->request_.solid->slab == nullptr ? wanted_part.uncropped() : wanted_part;
+    sparse_volume result;
+    channel counts;
+    const vp::status status = draw_solid_bits(part, result, counts);
+    this->add_solid_counts(status, wanted_part);
+    const typename base::stage_timer timer{*this, "fill"};
+    result.shape = surface_of.shape;
+    if (!surface_of.keys.empty() && !result.tiles.empty()) result = open_tiles(result, &surface_of.keys);
+    if (part.extent != wanted_part.extent)
+        keep_part(result, wanted_part.offset, wanted_part.extent);
+    else if (is_flood && wanted_part.offset.x != 0 && !result.tiles.empty()) // as without slabs, where it is padded
+        result = open_tiles(result);
+    std::optional<body_map> bodies;
+    if (this->bodies_) bodies.emplace(this->bodies_->find_in(wanted_part));
+    std::vector<fill_values> fills; // by target
+    for (const target wanted : this->request_.targets)
+        fills.push_back(wanted == target::occupancy || wanted == target::count
+                            ? fill_values{}
+                            : fill_of(surface_of, wanted, *this->request_.solid, bodies ? &*bodies : nullptr));
+    if (bodies && !bodies->is_everywhere() && !result.tiles.empty())
+        result = bodies->with_whole_tiles(result, [&](std::uint32_t a, std::uint32_t b) {
+            return std::all_of(fills.begin(), fills.end(), [&](const fill_values& f) { return f.of(a) == f.of(b); });
+        });
+    this->warn_of_solid(result.num_voxels(), surface_of.num_voxels());
+    for (std::size_t t = 0; t < fills.size(); ++t) {
+        const target wanted = this->request_.targets[t];
+        if (wanted == target::occupancy)
+            add_occupancy(result);
+        else if (wanted != target::count)
+            add_filled(result, surface_of, info_of(wanted).name, fills[t]);
+        else if (!counts.data.empty())
+            add_channel(result, wanted).data = std::move(counts.data);
+        else
+            fill_channel(add_channel(result, wanted), result.num_values(), 1U);
+    }
+    return result;
+}
+
+} // namespace voxelize
