@@ -38,7 +38,7 @@ enum class status_code : std::uint8_t {
     bad_count,            // a geometry program emitted more triangles than its type holds
     bad_subset,           // mesh_view::part: not one number a triangle, or not ascending below `whole`
     other_rank_failed,    // slabs/: this part of the work has not failed, that of another rank or GPU has
-    bad_cell_options,     // an option of voxelize_cells is out of its range
+    bad_cell_options,     // an option of voxelize_cells is out of its range, or a repair other than close_holes
     winding_too_large,    // voxelize_cells: the covers of a row's pixels may sum to more than 2^18 pixels
     crop_without_whole,   // repair::exterior of a crop: what lies outside follows from the whole grid
     bad_label_options,    // label: a connectivity other than 6, 18 and 26
@@ -235,7 +235,7 @@ struct required_sizes {
     case status_code::other_rank_failed:
         return "another rank or GPU failed: this one's part is not to be used";
     case status_code::bad_cell_options:
-        return "bad cell options: a value out of its range";
+        return "bad cell options: a value out of its range, or a repair other than close_holes";
     case status_code::winding_too_large:
         return "winding too large: the covers of a row sum to more than 2^18 pixels";
     case status_code::crop_without_whole:
