@@ -63,7 +63,7 @@ public:
                          static_cast<std::int64_t>(i / x / y) / side)] |= core::has_samples_on_cones;
         }
     }
-    // Of the brick with this voxel.
+    // The marks of the brick with this voxel.
     [[nodiscard]] unsigned marks(const glm::ivec3& voxel) const {
         return marks_[brick(voxel.x / side, voxel.y / side, voxel.z / side)];
     }
