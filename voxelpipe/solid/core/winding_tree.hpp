@@ -266,18 +266,22 @@ struct lid_angles {
         const double gap = o.length - n.radius, near = gap - reach;
         const bool is_leaf = n.behind == i + 1;
         const bool is_far = gap > 0.0 && 2.0 * n.area * n.radius <= limit * gap * gap * gap;
-        const double inverse = 1.0 / near;
-        const double least = n.is_closed != 0 ? 0.0 : n.length;
-        const double slope_of = lesser(n.length, greater(least, 2.0 * n.area * inverse)) * inverse * inverse;
+        double slope_of = 0.0, curve_of = 0.0;
+        if (reach > 0.0) {
+            const double inverse = 1.0 / near, square = inverse * inverse;
+            const double least = n.is_closed != 0 ? 0.0 : n.length;
+            slope_of = lesser(n.length, greater(least, 2.0 * n.area * inverse)) * square;
+            curve_of = lesser(2.0 * n.length, greater(2.0 * least, 6.0 * n.area * inverse)) * square * inverse;
+        }
         const bool is_flat = near > 0.0 && reach * slope_of <= limit;
         if (is_leaf || (is_far && is_flat)) {
             is_smooth = is_smooth && near > 0.0;
             slope += slope_of;
-            curve += lesser(2.0 * n.length, greater(2.0 * least, 6.0 * n.area * inverse)) * inverse * inverse * inverse;
+            curve += curve_of;
             if (is_far) {
-                sum += (n.vector_area[0] * o.d[0] + n.vector_area[1] * o.d[1] + n.vector_area[2] * o.d[2]) /
-                       (o.length * o.length * o.length);
-                error += 2.0 * n.area * n.radius / (gap * gap * gap);
+                const double cube = 1.0 / (o.length * o.length * o.length), further = o.length / gap;
+                sum += (n.vector_area[0] * o.d[0] + n.vector_area[1] * o.d[1] + n.vector_area[2] * o.d[2]) * cube;
+                error += 2.0 * n.area * n.radius * cube * (further * further * further);
                 i = n.behind;
                 continue;
             }
@@ -316,7 +320,7 @@ struct winding_sample {
     if (t.num_triangles == 0 || s.is_on_cone) return is_inside(rule, s.k);
     if (tries_bound && is_below_half(t, to_world(t, p))) return is_inside(rule, s.k);
     const std::int64_t k = s.k - s.k_cones + lids_below(t, p); // of the mesh with the tree's lids
-    for (double most = 0x1p-6; most > 0x1p-25; most *= 0x1p-6) {
+    for (double most = 0x1p-4; most > 0x1p-25; most *= 0x1p-4) {
         const lid_angles lids = find_lid_angles(t, p, 0.0, most);
         if (!lids.is_known) break;
         const int verdict = verdict_of(rule, static_cast<double>(k) - lids.turns, lids.error);
