@@ -38,7 +38,7 @@ enum class status_code : std::uint8_t {
     bad_count,            // a geometry program emitted more triangles than its type holds
     bad_subset,           // mesh_view::part: not one number a triangle, or not ascending below `whole`
     other_rank_failed,    // slabs/: this part of the work has not failed, that of another rank or GPU has
-    bad_cell_options,     // an option of voxelize_cells is out of its range
+    bad_cell_options,     // an option of voxelize_cells is out of its range, or a repair other than close_holes
     winding_too_large,    // voxelize_cells: the covers of a row's pixels may sum to more than 2^18 pixels
     crop_without_whole,   // repair::exterior of a crop: what lies outside follows from the whole grid
     bad_label_options,    // label: a connectivity other than 6, 18 and 26
@@ -110,7 +110,7 @@ struct solid_counters {
     std::uint64_t open_rows = 0;
     std::uint64_t crossings = 0;   // of triangles with rows, in, before and behind the grid
     std::uint64_t max_winding = 0; // greatest |winding number| of a voxel's centre; 0 for fill_rule::even_odd
-    // repair::close_holes only:
+    // repair::close_holes and repair::winding only:
     std::uint64_t hole_edges = 0; // edges that no opposite edge cancels
     std::uint64_t holes = 0;      // their connected components
     std::uint64_t cones = 0;      // holes that were closed
@@ -124,7 +124,6 @@ struct solid_counters {
 struct distance_counters {
     std::uint64_t band_samples = 0; // samples that hold their distance; the others hold the band's
     std::uint64_t bad_points = 0;   // distance_at: points that are not finite or beyond 2^40 sub-voxel units
-    std::uint64_t winding_sums = 0; // repair::winding: samples whose solid angles were summed
     friend bool operator==(const distance_counters&, const distance_counters&) = default;
 };
 
@@ -236,7 +235,7 @@ struct required_sizes {
     case status_code::other_rank_failed:
         return "another rank or GPU failed: this one's part is not to be used";
     case status_code::bad_cell_options:
-        return "bad cell options: a value out of its range";
+        return "bad cell options: a value out of its range, or a repair other than close_holes";
     case status_code::winding_too_large:
         return "winding too large: the covers of a row sum to more than 2^18 pixels";
     case status_code::crop_without_whole:

@@ -165,7 +165,7 @@ typedef struct vp_counters {
     uint64_t open_rows;           /* solids, distances, fractions: above 0 proves that the mesh is not closed */
     uint64_t crossings;           /* solids: of triangles with rows of voxels */
     uint64_t max_winding;         /* solids: greatest |winding number|; 0 for VP_FILL_EVEN_ODD */
-    uint64_t hole_edges;          /* VP_REPAIR_CLOSE_HOLES: edges that no opposite edge cancels */
+    uint64_t hole_edges;          /* VP_REPAIR_CLOSE_HOLES, _WINDING: edges that no opposite edge cancels */
     uint64_t holes;               /* ... their connected components */
     uint64_t cones;               /* ... those that were closed */
     uint64_t band_samples;        /* distances: samples that hold their distance */
@@ -217,7 +217,8 @@ enum {
     VP_REPAIR_NONE = 0,
     VP_REPAIR_CLOSE_HOLES = 1, /* a cone over each hole's boundary */
     VP_REPAIR_EXTERIOR = 2,    /* what a flood from outside does not reach; fills cavities */
-    VP_REPAIR_VOTE = 3         /* what most of the closed rows along x, y and z call inside */
+    VP_REPAIR_VOTE = 3,        /* what most of the closed rows along x, y and z call inside */
+    VP_REPAIR_WINDING = 4      /* a generalized winding number of 1/2 or more; not with VP_FILL_EVEN_ODD */
 };
 
 /* VP_REPAIR_EXTERIOR and VP_REPAIR_VOTE have an inside of their own: fill and extent keep their defaults with them. */
@@ -228,7 +229,7 @@ typedef struct vp_solid_options {
     int32_t extent;          /* VP_EXTENT_... */
     int32_t repair;          /* VP_REPAIR_... */
     int32_t closing;         /* VP_REPAIR_EXTERIOR: gaps of up to about twice as many voxels are closed, 0 to 64 */
-    uint64_t max_hole_edges; /* VP_REPAIR_CLOSE_HOLES: holes with more edges stay open; 0: none does */
+    uint64_t max_hole_edges; /* VP_REPAIR_CLOSE_HOLES, _WINDING: holes with more edges stay open; 0: none does */
 } vp_solid_options;
 
 /* 1 in voxels inside of the mesh, 0 in the others. out: VP_TYPE_UINT8 or VP_TYPE_BITS. */

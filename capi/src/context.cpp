@@ -129,11 +129,11 @@ solid_options solid_options_of(const vp_solid_options& o) {
     check_enum(o.fill, VP_FILL_POSITIVE, "fill");
     check_enum(o.bodies, VP_BODIES_EACH, "bodies");
     check_enum(o.extent, VP_EXTENT_INNER, "extent");
-    check_enum(o.repair, VP_REPAIR_VOTE, "repair");
+    check_enum(o.repair, VP_REPAIR_WINDING, "repair");
     check_enum(o.closing, solid_options::max_closing, "closing");
     constexpr fill_rule rules[] = {fill_rule::nonzero, fill_rule::even_odd, fill_rule::positive};
     constexpr solid_extent extents[] = {solid_extent::centre, solid_extent::outer, solid_extent::inner};
-    constexpr repair repairs[] = {repair::none, repair::close_holes, repair::exterior, repair::vote};
+    constexpr repair repairs[] = {repair::none, repair::close_holes, repair::exterior, repair::vote, repair::winding};
     solid_options options;
     options.rule = rules[o.fill];
     options.bodies = o.bodies == VP_BODIES_EACH ? bodies::draw : bodies::call;

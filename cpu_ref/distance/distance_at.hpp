@@ -6,7 +6,7 @@
 // below it along x.
 
 #include <cpu_ref/distance/voxelize_distance.hpp>
-#include <voxelpipe/distance/core/row_crossing.hpp>
+#include <voxelpipe/solid/core/row_crossing.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -55,18 +55,29 @@ namespace voxelpipe::cpu {
     return best;
 }
 
-// True if a body has the point inside.
+// True if a body has the point inside. trees: of each body's holes, for repair::winding, or none.
 [[nodiscard]] inline bool is_inside(const solid_geometry& s, const triangle_tree& tree, const vector3& scale,
-                                    fill_rule rule, const core::snapped_position& p,
-                                    std::vector<std::int64_t>& windings) {
+                                    fill_rule rule, const std::vector<core::winding_tree>& trees,
+                                    const core::snapped_position& p, std::vector<std::int64_t>& windings) {
     std::fill(windings.begin(), windings.end(), 0);
+    std::vector<core::winding_sample> samples(trees.size());
     tree.visit_below(place(p, scale), [&](std::size_t first, std::size_t last) {
         for (std::size_t i = first; i < last; ++i) {
             const std::uint32_t id = tree[i].primitive;
             const snapped_triangle t = find_triangle(s, id);
-            windings[s.body[s.find(id).draw]] += core::crossing_below(t.a, t.b, t.c, p);
+            const std::size_t part = s.find(id).draw, body = s.body[part];
+            const int crossing = core::crossing_below(t.a, t.b, t.c, p);
+            windings[body] += crossing;
+            if (trees.empty() || !s.is_repair[part]) continue;
+            samples[body].k_cones += crossing;
+            samples[body].is_on_cone = samples[body].is_on_cone || core::is_on_triangle(t.a, t.b, t.c, p);
         }
     });
+    for (std::size_t body = 0; body < trees.size(); ++body) {
+        samples[body].k = windings[body];
+        if (core::is_inside_by_winding(trees[body].view(), p, samples[body], rule)) return true;
+    }
+    if (!trees.empty()) return false;
     return std::any_of(windings.begin(), windings.end(), [&](std::int64_t w) {
         return rule == fill_rule::even_odd ? w % 2 != 0 : rule == fill_rule::positive ? w > 0 : w != 0;
     });
@@ -94,12 +105,14 @@ template <class Mesh, class VertexShader, class Shader>
         // The bodies, with the cones that close them.
         std::optional<cpu::solid_geometry> bodies;
         std::unique_ptr<cpu::triangle_tree> body_tree;
+        std::vector<winding_tree> trees;
         std::size_t num_bodies = 0;
         if (options.sign == distance_sign::inside && triangles_in != 0) {
             const solid_options solid = sign_options(options);
             bodies.emplace(cpu::make_solid_geometry(how, draws, g, glm::ivec3(0), solid));
-            if (options.repair == repair::close_holes && !cpu::add_cones(*bodies, solid, result.solid))
+            if (has_cones(options.repair) && !cpu::add_cones(*bodies, solid, result.solid))
                 return cpu::solid_failure(status_code::too_many_triangles, *bodies);
+            if (options.repair == repair::winding) trees = cpu::make_winding_trees(*bodies);
             body_tree = std::make_unique<cpu::triangle_tree>(how, *bodies, cpu::reach_of(options, g),
                                                              triple<std::int64_t>{}, scale);
             num_bodies = *std::max_element(bodies->body.begin(), bodies->body.end()) + std::size_t{1};
@@ -126,7 +139,7 @@ template <class Mesh, class VertexShader, class Shader>
                     if (!call.tree->empty())
                         nearest = call.shapes.numbers_of(call.shapes.find(n.primitive), n.primitive).primitive;
                     if (distance > 0.0f && body_tree != nullptr &&
-                        cpu::is_inside(*bodies, *body_tree, scale, options.rule, p, windings))
+                        cpu::is_inside(*bodies, *body_tree, scale, options.rule, trees, p, windings))
                         distance = -distance;
                 }
                 if (out.distances != nullptr) out.distances[i] = distance;

@@ -9,6 +9,7 @@
 #include <cpu_ref/solid/solid_lists.hpp>
 #include <cpu_ref/solid/solid_repair.hpp>
 #include <cpu_ref/solid/solid_vote.hpp>
+#include <cpu_ref/solid/solid_winding.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -74,17 +75,26 @@ template <class Crossing, class Finish>
         result.counts = found.counts;
         crossings = std::move(found.crossings);
     }
-    const bool is_set = options.repair == repair::exterior || options.repair == repair::vote;
+    const bool is_set =
+        options.repair == repair::exterior || options.repair == repair::vote || options.repair == repair::winding;
     const bool is_decided = options.repair == repair::exterior && options.slab != nullptr;
-    if (is_set || options.extent != solid_extent::centre) {
-        cover_list cover = is_decided ? count_triangles(s) : find_cover(how, s);
+    const bool is_winding = options.repair == repair::winding;
+    if ((is_set && !is_winding) || options.extent != solid_extent::centre) {
+        cover_list cover = is_decided   ? count_triangles(s)
+                           : is_winding ? find_cover(how, keep_parts(s, false))
+                                        : find_cover(how, s);
         if (cover.code != status_code::ok) return solid_failure(cover.code, s);
         if (options.repair == repair::exterior) result.counts = cover.counts;
         words = std::move(cover.beams);
     }
     if (is_set) { // the sweep has nothing to do but hand the words on
+        const solid_extent extent = options.extent;
         options.extent = solid_extent::outer;
-        if (options.repair == repair::vote) {
+        if (is_winding) {
+            words =
+                join_cover(how, find_windings(how, s, options.rule, crossings, result.solid), std::move(words), extent);
+            crossings = {};
+        } else if (options.repair == repair::vote) {
             count_crossings(crossings, result.solid);
             crossings = {};
             words = find_majority(how, s, options.slab, std::move(words));
@@ -105,7 +115,7 @@ template <class Mesh, class VertexShader, class SolidShader, class Finish>
                                const Finish& finish) {
     solid_geometry s = make_solid_geometry(how, draws, g, lead, options);
     status result;
-    if (options.repair == repair::close_holes && !add_cones(s, options, result.solid))
+    if (core::has_cones(options.repair) && !add_cones(s, options, result.solid))
         return solid_failure(status_code::too_many_triangles, s);
     constexpr bool needs_winding = shader_reads_winding<draw<Mesh, VertexShader, SolidShader>>;
     const bool small_keys = row_numbers(g.extent).num_beams() * tile_rows <= std::uint64_t{1} << 32;

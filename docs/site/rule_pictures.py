@@ -102,6 +102,7 @@ def repairs():
         ("the mesh", None),
         ("no repair", {}),
         ("close_holes", {"repair": "close_holes"}),
+        ("winding", {"repair": "winding"}),
         ("vote", {"repair": "vote"}),
         ("exterior, closing 15", {"repair": "exterior", "closing": 15}),
     ):
@@ -114,7 +115,7 @@ def repairs():
             text = f"{label}\n{100 * volume.sum() / closed:.1f} %"
         half = volume.copy()
         half[grid.shape[0] // 2 :] = False
-        panels.append((rendered(half, grid, width // 5, azimuth=25, elevation=15), text))
+        panels.append((rendered(half, grid, width // 6, azimuth=25, elevation=15), text))
     side_by_side("repairs", panels)
 
 

@@ -84,7 +84,8 @@ template <class T>
                                    {{"none", repair::none},
                                     {"close_holes", repair::close_holes},
                                     {"exterior", repair::exterior},
-                                    {"vote", repair::vote}});
+                                    {"vote", repair::vote},
+                                    {"winding", repair::winding}});
     if (options.repair == repair::exterior || options.repair == repair::vote) {
         // They have an inside of their own, so the module's defaults are the library's.
         if (options.rule != fill_rule::nonzero)
@@ -95,6 +96,9 @@ template <class T>
     } else {
         options.extent = extent_named;
     }
+    if (options.repair == repair::winding && options.rule == fill_rule::even_odd)
+        throw nb::value_error("repair='winding' takes a generalized winding number of 1/2 or more for inside, which is "
+                              "neither even nor odd: take 'nonzero' or 'positive'");
     options.bodies = named<bodies>("bodies", bodies_name, {{"all", bodies::call}, {"each", bodies::draw}});
     if (max_hole_edges) options.max_hole_edges = *max_hole_edges;
     options.closing = closing;

@@ -71,6 +71,7 @@ def test_open_mesh_warns_and_repairs_decide_the_sign():
     with pytest.warns(vp.OpenMeshWarning, match="rows of samples"):
         vp.distance(holed, GRID)
     closed = vp.distance(holed, GRID, "whole", repair="close_holes")
+    assert np.array_equal(vp.distance(holed, GRID, "whole", repair="winding"), closed)  # the hole is flat
     assert np.array_equal(closed < 0, vp.solid((v, f), GRID, extent="centre"))
     for sample in ("centre", "corner"):
         assert (vp.distance(holed, GRID, sign="unsigned", corners=sample == "corner") >= 0).all()
@@ -146,3 +147,5 @@ def test_points_that_have_no_distance_are_counted():
         vp.distance_at(mesh, np.zeros((3, 2)))
     with pytest.raises(ValueError):
         vp.distance_at(mesh, at, repair="vote")
+    with pytest.raises(ValueError, match="nonzero"):
+        vp.distance_at(mesh, at, sign="even_odd", repair="winding")

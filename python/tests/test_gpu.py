@@ -96,7 +96,7 @@ def test_solids(gpu, fill, extent):
         assert a == b
 
 
-@pytest.mark.parametrize("repair", ["close_holes", "exterior", "vote"])
+@pytest.mark.parametrize("repair", ["close_holes", "exterior", "vote", "winding"])
 def test_repairs(gpu, repair):
     mesh = (MESH[0], MESH[1][8:])
     on_device = tuple(map(gpu.put, mesh))

@@ -63,6 +63,36 @@ def test_open_mesh_warns_and_repairs_close_it():
     assert status["holes"] == status["cones"] == 1 and status["hole_edges"] == 4
     vote = vp.solid(holed, grid, repair="vote")
     assert np.array_equal(vote & whole, whole)
+    assert np.array_equal(vp.solid(holed, grid, extent="centre", repair="winding", status=status), whole)
+    assert status["holes"] == 1 and status["open_rows"] == 0
+
+
+def test_winding_is_the_solid_angle_of_the_triangles():
+    def numbers(mesh, points):
+        """Generalized winding numbers, by the formula of van Oosterom and Strackee."""
+        v, f = mesh
+        a, b, c = (v[f[:, k]][None].astype(float) - points[:, None] for k in range(3))
+        length = [np.linalg.norm(x, axis=2) for x in (a, b, c)]
+        volume = np.einsum("ijk,ijk->ij", a, np.cross(b, c))
+        other = length[0] * length[1] * length[2]
+        for x, y, n in ((a, b, length[2]), (b, c, length[0]), (c, a, length[1])):
+            other += np.einsum("ijk,ijk->ij", x, y) * n
+        return np.arctan2(volume, other).sum(axis=1) / (2 * np.pi)
+
+    v, f = sphere(5.0, (6.1, 5.9, 6.3))
+    for fill, faces in (("nonzero", f[::-1][: len(f) // 2]), ("nonzero", f[40:, ::-1]), ("positive", f[25:])):
+        mesh, grid = (v, faces), vp.Grid((0, 0, 0), (1, 1, 1), (12, 12, 12))
+        inside = vp.solid(mesh, grid, fill, extent="centre", repair="winding")
+        k, j, i = np.indices(inside.shape).reshape(3, -1)
+        w = numbers(mesh, np.stack((i, j, k), 1) + 0.5).reshape(inside.shape)
+        size = np.abs(w) if fill == "nonzero" else w
+        sure = np.abs(size - 0.5) > 1e-5  # positions are snapped
+        assert sure.mean() > 0.99 and inside.sum() > 50
+        assert np.array_equal(inside[sure], size[sure] > 0.5)
+        crop = grid.crop((3, 4, 2), (6, 8, 9))
+        assert np.array_equal(vp.solid(mesh, crop, fill, extent="centre", repair="winding"), inside[2:11, 4:12, 3:9])
+    with pytest.raises(ValueError, match="neither even nor odd"):
+        vp.solid((v, f), grid, "even_odd", repair="winding")
 
 
 def test_exterior_fills_cavities():

@@ -26,10 +26,10 @@ def _host_mesh(mesh: MeshLike, what: str = "distances") -> Mesh:
 
 
 def _warn_of_holes(counts: dict[str, int], rows: str, repair: str) -> None:
-    if counts["open_rows"] and repair in ("none", "close_holes"):
+    if counts["open_rows"] and repair in ("none", "close_holes", "winding"):
         warnings.warn(
             f"the mesh is not closed: {counts['open_rows']}{rows} do not balance, and the sign behind a hole is in doubt; "
-            'repair="close_holes", "exterior" or "vote" may help, or sign="unsigned"',
+            'repair="close_holes", "winding", "exterior" or "vote" may help, or sign="unsigned"',
             OpenMeshWarning,
             stacklevel=3,
         )
@@ -137,7 +137,7 @@ def distance_at(
     Args:
         mesh, points: what voxelize() takes, and positions (n, 3).
         grid: whose lattice positions are snapped to.
-        sign, repair, bodies, max_hole_edges: as in distance(); repair is "none" or "close_holes".
+        sign, repair, bodies, max_hole_edges: as in distance(); repair is "none", "close_holes" or "winding".
         threads: 0 takes all cores.
         nearest: also returns the number of each point's nearest triangle, int64.
         status: a dict that is filled with the call's counters; bad_points are those that are not finite or too far from the

@@ -98,7 +98,7 @@ def solid_voxels(m: Any, grid: Grid, options: Any, as_tiles: bool,
     voxels, tiles, counts = _core.solid_list(
         positions, m.triangles, list(m.first_triangles), where, *options, as_tiles, threads
     )
-    if counts["open_rows"] and options[2] in ("none", "close_holes"):
+    if counts["open_rows"] and options[2] in ("none", "close_holes", "winding"):
         warnings.warn(
             f"the mesh is not closed: {counts['open_rows']} rows of voxels do not balance, and what lies behind a hole is in "
             "doubt; solid() tells which repairs help",
@@ -190,10 +190,12 @@ def solid(
         extent: "outer", the voxels whose centre is inside, and those that a triangle touches; "centre" (or "center"), the
             former alone; "inner", those whose centre is inside and that no triangle touches.
         repair: "none"; "close_holes" puts a cone over each hole's boundary; "exterior" takes for inside what a flood from
-            outside does not reach (fills cavities, no crops); "vote" takes the majority of rows along x, y and z. The last
-            two have an inside of their own: another fill or extent than the default is a ValueError.
+            outside does not reach (fills cavities, no crops); "vote" takes the majority of rows along x, y and z. These two
+            have an inside of their own: another fill or extent than the default is a ValueError. "winding" takes for
+            inside where the generalized winding number, the solid angles of all triangles over 4 pi, is at least 1/2, with
+            fill="nonzero" its magnitude: holes close smoothly. fill="even_odd" with it is a ValueError.
         bodies: "all", the meshes of a list together; "each", every one by itself.
-        max_hole_edges: for close_holes, holes with more edges stay open.
+        max_hole_edges: for close_holes and winding, holes with more edges stay open.
         closing: for exterior, gaps of up to about twice as many voxels are closed, 0 to 64.
         packed: uint32 (nz, ny, ceil(nx / 32)) in place of bool, a bit for each voxel, lowest bit first: an eighth of the
             memory. int32 for torch, the same bits. On the CPU only.
@@ -255,7 +257,7 @@ def solid(
             OpenMeshWarning,
             stacklevel=2,
         )
-    if counts["open_rows"] and repair in ("none", "close_holes"):
+    if counts["open_rows"] and repair in ("none", "close_holes", "winding"):
         rows = grid.shape[0] * grid.shape[1]
         warnings.warn(
             f"the mesh is not closed: {counts['open_rows']} of {rows} rows of voxels do not balance, and what lies "

@@ -17,7 +17,7 @@ Coverage = Literal["conservative", "thin", "crosshair", "diagonal"]
 Fill = Literal["nonzero", "even_odd", "positive"]
 Sign = Literal["nonzero", "even_odd", "positive", "unsigned"]
 Extent = Literal["outer", "centre", "center", "inner"]
-Repair = Literal["none", "close_holes", "exterior", "vote"]
+Repair = Literal["none", "close_holes", "exterior", "vote", "winding"]
 # Those that leave a mesh.
 HoleRepair = Literal["none", "close_holes"]
 Bodies = Literal["all", "each"]

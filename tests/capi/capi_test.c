@@ -164,6 +164,12 @@ static void rules_and_repairs(vp_context* context) {
     solid.repair = VP_REPAIR_VOTE;
     OK(vp_solid(context, open, &grid, &solid, &out, NULL));
     CHECK(count(mask, 512) >= 216);
+    solid.repair = VP_REPAIR_WINDING; /* more than half of what a point sees is the box: not where two sides are near */
+    OK(vp_solid(context, open, &grid, &solid, &out, &counters));
+    CHECK(counters.holes == 2 && count(mask, 512) > 100 && count(mask, 512) <= 216);
+    CHECK(mask[(4 * 8 + 4) * 8 + 4] == 1 && mask[0] == 0);
+    solid.fill = VP_FILL_EVEN_ODD;
+    CHECK(vp_solid(context, open, &grid, &solid, &out, NULL) == VP_ERROR_BAD_OPTION);
     vp_mesh_destroy(open);
 }
 

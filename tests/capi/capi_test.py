@@ -198,8 +198,8 @@ class Api(unittest.TestCase):
         out, out_float = array(0, 64), array(2, 64)
         grid = c.byref(unit_grid())
         self.fails("BAD_OPTION", "coverage is 4", self.surface(out, options=SurfaceOptions(coverage=4)))
-        for members, text in (({"fill": -1}, "fill"), ({"bodies": 2}, "bodies"), ({"extent": 3}, "extent"), ({"repair": 4}, "repair"),
-                              ({"closing": 65}, "closing"), ({"repair": 3, "fill": 1}, "bad solid options")):
+        for members, text in (({"fill": -1}, "fill"), ({"bodies": 2}, "bodies"), ({"extent": 3}, "extent"), ({"repair": 5}, "repair"),
+                              ({"closing": 65}, "closing"), ({"repair": 3, "fill": 1}, "bad solid options"), ({"repair": 4, "fill": 1}, "bad solid options")):
             self.fails("BAD_OPTION", text, vp.vp_solid(self.context, self.cube, grid, c.byref(SolidOptions(**members)), c.byref(out), None))
         for members, text in (({"is_whole": 1, "band": 3.0}, "band"), ({"band": -1.0}, "distance options"), ({"band": float("nan")}, "distance options"),
                               ({"is_unsigned": 1, "fill": 1}, "distance options"), ({"repair": 9}, "repair")):

@@ -340,7 +340,7 @@ TEST(Cells, BadInput) {
     const std::vector<float> before = vp::get<0>(fb).to_host(backend);
     EXPECT_EQ(draw(m, {.axis = 3}).code, vp::status_code::bad_cell_options);
     EXPECT_EQ(draw(m, {.axis = -1}).code, vp::status_code::bad_cell_options);
-    for (const vp::repair r : {vp::repair::vote, vp::repair::exterior})
+    for (const vp::repair r : {vp::repair::vote, vp::repair::exterior, vp::repair::winding})
         EXPECT_EQ(draw(m, {.repair = r}).code, vp::status_code::bad_cell_options);
     m.triangles.push_back({0, 1, 99});
     const vp::status bad = draw(m, {});

@@ -43,7 +43,8 @@ TEST(DistanceAt, SamplesOfAGridHaveTheirDistances) {
                 for (int x = 0; x < 13; ++x) points.emplace_back(glm::vec3(glm::ivec3(x, y, z)) + 0.5f);
         for (const vp::fill_rule rule : {vp::fill_rule::even_odd, vp::fill_rule::nonzero, vp::fill_rule::positive})
             for (const vp::bodies bodies : {vp::bodies::call, vp::bodies::draw})
-                for (const vp::repair repair : {vp::repair::none, vp::repair::close_holes}) {
+                for (const vp::repair repair : {vp::repair::none, vp::repair::close_holes, vp::repair::winding}) {
+                    if (repair == vp::repair::winding && rule == vp::fill_rule::even_odd) continue;
                     const vp::distance_options o{
                         .band = vp::band::whole, .rule = rule, .bodies = bodies, .repair = repair};
                     const field f = library_field(draws, g, o);
@@ -104,6 +105,8 @@ TEST(DistanceAt, BadPointsAreCounted) {
     for (const vp::repair repair : {exterior, vote})
         EXPECT_EQ(library_points({mesh{}}, g, points, {.repair = repair}).status.code,
                   vp::status_code::bad_distance_options);
+    EXPECT_EQ(library_points({mesh{}}, g, points, {.rule = vp::fill_rule::even_odd, .repair = winding}).status.code,
+              vp::status_code::bad_solid_options);
 }
 
 TEST(DistanceSparse, HoldsTheBandOfTheDenseField) {

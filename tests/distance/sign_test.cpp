@@ -51,6 +51,9 @@ TEST(DistanceSign, IsTheSolidsUnderEveryRuleAndRepair) {
                     all.push_back({.rule = rule, .bodies = bodies, .repair = repair});
         all.push_back({.repair = vp::repair::exterior, .closing = 2});
         all.push_back({.repair = vp::repair::vote});
+        for (const vp::bodies bodies : {vp::bodies::call, vp::bodies::draw})
+            all.push_back({.bodies = bodies, .repair = vp::repair::winding});
+        all.push_back({.sample = vp::sample::centre, .rule = vp::fill_rule::positive, .repair = vp::repair::winding});
         for (const vp::distance_options& o : all) {
             const field f = library_field(draws, g, o);
             ASSERT_TRUE(f.status.ok()) << f.status.message();

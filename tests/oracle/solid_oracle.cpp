@@ -3,6 +3,7 @@
 
 #include "solid_oracle.hpp"
 
+#include <cmath>
 #include <stdexcept>
 
 namespace oracle {
@@ -82,6 +83,52 @@ std::int64_t winding_oracle::winding(const voxel& at) const {
         if (t.face.sign(p) == t.front) sum += t.front;
     }
     return sum;
+}
+
+generalized_winding find_generalized_winding(int fraction_bits, const std::vector<snapped_triangle>& mesh,
+                                             const std::array<double, 3>& voxel_size, const voxel& at) {
+    using real = long double;
+    const std::int64_t half = std::int64_t{1} << (fraction_bits - 1);
+    const std::int64_t p[3] = {(2 * std::int64_t{at.i} + 1) * half, (2 * std::int64_t{at.j} + 1) * half,
+                               (2 * std::int64_t{at.k} + 1) * half};
+    const real full = 4.0L * std::acos(-1.0L);
+    generalized_winding w{0.0L, 0.0L, false};
+    for (const snapped_triangle& t : mesh) {
+        if (t.dropped) continue;
+        int128 q[3][3]; // vertices from the centre
+        for (int n = 0; n < 3; ++n)
+            for (int k = 0; k < 3; ++k) q[n][k] = t.v[n][k] - p[k];
+        const auto cross = [&](int n, int m, int k) {
+            const int u = (k + 1) % 3, v = (k + 2) % 3;
+            return q[n][u] * q[m][v] - q[n][v] * q[m][u];
+        };
+        int128 volume = 0;
+        for (int k = 0; k < 3; ++k) volume += q[0][k] * cross(1, 2, k);
+        if (volume == 0) {
+            // In the plane: inside if no two of the three small triangles turn against each other.
+            bool has_area = false, same = true;
+            for (int k = 0; k < 3; ++k) {
+                const int128 c[3] = {cross(0, 1, k), cross(1, 2, k), cross(2, 0, k)};
+                has_area = has_area || c[0] + c[1] + c[2] != 0;
+                same = same && ((c[0] >= 0 && c[1] >= 0 && c[2] >= 0) || (c[0] <= 0 && c[1] <= 0 && c[2] <= 0));
+            }
+            w.is_on_surface = w.is_on_surface || (has_area && same);
+            continue;
+        }
+        real r[3][3], length[3];
+        const real size[3] = {voxel_size[0], voxel_size[1], voxel_size[2]};
+        for (int n = 0; n < 3; ++n) {
+            for (int k = 0; k < 3; ++k) r[n][k] = static_cast<real>(q[n][k]) * size[k];
+            length[n] = std::sqrt(r[n][0] * r[n][0] + r[n][1] * r[n][1] + r[n][2] * r[n][2]);
+        }
+        const auto dot_of = [&](int n, int m) { return r[n][0] * r[m][0] + r[n][1] * r[m][1] + r[n][2] * r[m][2]; };
+        const real sine = static_cast<real>(volume) * size[0] * size[1] * size[2];
+        const real all = length[0] * length[1] * length[2];
+        const real cosine = all + dot_of(0, 1) * length[2] + dot_of(1, 2) * length[0] + dot_of(2, 0) * length[1];
+        w.number += 2.0L * std::atan2(sine, cosine) / full;
+        w.doubt += 0x1p-58L * all / std::hypot(sine, cosine);
+    }
+    return w;
 }
 
 } // namespace oracle

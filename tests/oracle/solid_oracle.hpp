@@ -44,4 +44,15 @@ private:
     std::vector<piece> pieces_;
 };
 
+// The generalized winding number of a voxel's centre: the solid angles of the given triangles over 4 pi, in long double
+// by libm. No cones, no rows: it holds for open meshes as for closed ones.
+struct generalized_winding {
+    long double number;
+    long double doubt;  // what roundings may have done to it
+    bool is_on_surface; // the centre lies on a triangle, and the number is not defined
+};
+// voxel_size: only ratios matter.
+generalized_winding find_generalized_winding(int fraction_bits, const std::vector<snapped_triangle>& mesh,
+                                             const std::array<double, 3>& voxel_size, const voxel& at);
+
 } // namespace oracle

@@ -40,6 +40,7 @@ std::vector<vp::solid_options> all_repairs() {
             for (const auto inside : {vp::solid_extent::centre, vp::solid_extent::outer, vp::solid_extent::inner})
                 all.push_back({.rule = rule, .bodies = of, .extent = inside, .repair = vp::repair::close_holes});
         all.push_back({.bodies = of, .repair = vp::repair::close_holes, .max_hole_edges = 3});
+        all.push_back({.bodies = of, .extent = vp::solid_extent::outer, .repair = vp::repair::winding});
         all.push_back({.bodies = of, .repair = vp::repair::vote});
         for (const int closing : {0, 1, 4})
             all.push_back({.bodies = of, .repair = vp::repair::exterior, .closing = closing});
@@ -171,7 +172,7 @@ TEST(RepairedStream, SlabsOfSparseFramebuffersMerge) {
 }
 
 TEST(RepairedStream, ASlabThatRunsOutOfMemoryIsCutAgain) {
-    for (const auto kind : {vp::repair::close_holes, vp::repair::vote, vp::repair::exterior}) {
+    for (const auto kind : {vp::repair::close_holes, vp::repair::vote, vp::repair::exterior, vp::repair::winding}) {
         whole_solid whole{broken_scene(extent), unit::unit_grid(extent), {.repair = kind}};
         stream_type stream(whole.backend, whole.grid, {}, options_for(whole.how, 2));
         feed(stream, whole.mesh);

@@ -497,7 +497,7 @@ TEST(SolidPipeline, BadInputGivesItsStatusAndWritesNothing) {
     expect_refused(code::bad_solid_options, [](broken_call& c) { c.options.rule = static_cast<rule>(3); });
     expect_refused(code::bad_solid_options, [](broken_call& c) { c.options.extent = static_cast<extent_of>(9); });
     expect_refused(code::bad_solid_options, [](broken_call& c) { c.options.bodies = static_cast<vp::bodies>(2); });
-    expect_refused(code::bad_solid_options, [](broken_call& c) { c.options.repair = static_cast<vp::repair>(4); });
+    expect_refused(code::bad_solid_options, [](broken_call& c) { c.options.repair = static_cast<vp::repair>(5); });
     expect_refused(code::crop_without_whole, [](broken_call& c) {
         c.g = unit_grid(glm::ivec3(16)).crop(glm::ivec3(4), glm::ivec3(8));
         c.options.repair = vp::repair::exterior;

@@ -106,6 +106,13 @@ TEST(DeviceRepairs, HolesAndVotes) {
         }
 }
 
+TEST(DeviceRepairs, WindingNumbers) {
+    const mesh_data there = moved(broken_meshes()[1], places[2]);
+    const vp::grid part = box_grid({67, 31, 29}).crop({3, 5, 2}, {33, 17, 20});
+    case_of_slabs{there, part, {.repair = vp::repair::winding}, 3}.expect_same();
+    case_of_slabs{there, box_grid({37, 26, 25}), {.repair = vp::repair::winding}}.expect_same();
+}
+
 TEST(DeviceRepairs, Exteriors) {
     for (const mesh_data& m : broken_meshes())
         for (const glm::vec3& by : places)
@@ -126,13 +133,13 @@ TEST(DeviceRepairs, OnlyHolesMayTurn) {
     mesh_data thin = broken_meshes()[0]; // one layer along x and z
     for (glm::vec3& p : thin.positions) p = {18.0f + 0.01f * p.x, p.y, 12.0f + 0.01f * p.z};
     const vp::grid g = box_grid({37, 26, 25});
-    for (const auto repair : {vp::repair::close_holes, vp::repair::vote, vp::repair::exterior}) {
+    for (const auto repair : {vp::repair::close_holes, vp::repair::vote, vp::repair::exterior, vp::repair::winding}) {
         slabs::devices gpus(gpus_for(2), is_parallel);
         slabs::device_options options;
         options.repair = repair;
         const slabs::device_slabs drawn(gpus, g, vp::mesh_view<>{thin.positions, thin.triangles}, vp::passthrough{},
                                         options);
-        EXPECT_EQ(drawn.cuts().axis, repair == vp::repair::close_holes ? 1 : 2);
+        EXPECT_EQ(drawn.cuts().axis, vp::core::has_cones(repair) ? 1 : 2);
     }
     const vp::solid_options holes{.extent = vp::solid_extent::outer, .repair = vp::repair::close_holes};
     case_of_slabs{thin, g, holes, 2, {}}.expect_same();
@@ -211,7 +218,7 @@ TEST(DeviceRepairs, ListsAndSparseResults) {
     const vp::mesh_view<> view{m.positions, m.triangles};
     const vp::grid g = box_grid({37, 26, 25});
     vp::cpu_backend cpu;
-    for (const auto repair : {vp::repair::close_holes, vp::repair::vote, vp::repair::exterior}) {
+    for (const auto repair : {vp::repair::close_holes, vp::repair::vote, vp::repair::exterior, vp::repair::winding}) {
         SCOPED_TRACE(static_cast<int>(repair));
         const vp::solid_options how{.repair = repair, .closing = repair == vp::repair::exterior ? 1 : 0};
         slabs::devices gpus(gpus_for(3), is_parallel);

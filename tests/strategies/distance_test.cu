@@ -54,7 +54,9 @@ TEST(DeviceDistance, SignsOfEveryRuleAndRepair) {
          {vp::distance_options{}, vp::distance_options{.rule = vp::fill_rule::positive},
           vp::distance_options{.bodies = vp::bodies::draw, .repair = vp::repair::close_holes},
           vp::distance_options{.repair = vp::repair::exterior, .closing = 1},
-          vp::distance_options{.repair = vp::repair::vote}})
+          vp::distance_options{.repair = vp::repair::vote}, vp::distance_options{.repair = vp::repair::winding},
+          vp::distance_options{
+              .rule = vp::fill_rule::positive, .bodies = vp::bodies::draw, .repair = vp::repair::winding}})
         expect_same<two_targets>(meshes, unit_grid(extent), nearest_shader{}, o);
 }
 
@@ -115,6 +117,9 @@ TEST(DeviceDistance, PointsHaveTheBytesOfTheCpu) {
     for (const vp::distance_options& o :
          {vp::distance_options{}, vp::distance_options{.sign = vp::distance_sign::none},
           vp::distance_options{.bodies = vp::bodies::draw, .repair = vp::repair::close_holes},
+          vp::distance_options{.repair = vp::repair::winding},
+          vp::distance_options{
+              .rule = vp::fill_rule::positive, .bodies = vp::bodies::draw, .repair = vp::repair::winding},
           vp::distance_options{.rule = vp::fill_rule::even_odd}})
         expect_same_points(meshes, unit_grid(extent), 300, o);
     expect_same_points({mesh_data{}}, unit_grid(extent), 10, {});

@@ -56,7 +56,7 @@ TEST(Solids, ABadIndexWritesNothing) {
     const vp::mesh<vp::cuda_backend> mesh(gpu, m.positions, m.triangles);
     std::vector<vp::solid_options> options;
     for (const auto rule : all_rules) options.push_back({.rule = rule});
-    for (const auto repair : {vp::repair::close_holes, vp::repair::exterior, vp::repair::vote})
+    for (const auto repair : {vp::repair::close_holes, vp::repair::exterior, vp::repair::vote, vp::repair::winding})
         options.push_back({.repair = repair});
     for (const vp::solid_options& o : options) {
         SCOPED_TRACE(static_cast<int>(o.rule) + 10 * static_cast<int>(o.repair));
@@ -246,6 +246,27 @@ TEST(Solids, ExteriorAndVote) {
     one.expect_same(box_grid({130, 41, 43}), {.repair = vp::repair::exterior, .closing = 35});
 }
 
+// Rows without crossings, bricks over the faces of the grid, bodies with and without cones.
+TEST(Solids, GeneralizedWindingNumbers) {
+    const drawing_of_everything all{broken_meshes(), {{0.0f}, {0.25f}}, {{1, 0.1f}, {2, 3.0f}, {3, -1.0f}}};
+    const drawing_of_bits bits{broken_meshes(), {{}}, {{true}}};
+    const vp::grid part = box_grid({37, 26, 25}).crop({3, 5, 2}, {33, 9, 10});
+    bits.expect_same(box_grid({37, 26, 25}), {.repair = vp::repair::winding});
+    for (const auto of : all_bodies) {
+        for (const auto extent : {vp::solid_extent::outer, vp::solid_extent::inner})
+            bits.expect_same(part, {.bodies = of, .extent = extent, .repair = vp::repair::winding});
+        const vp::solid_options positive{
+            .rule = vp::fill_rule::positive, .bodies = of, .repair = vp::repair::winding, .max_hole_edges = 9};
+        all.expect_same(part, positive, loading::load);
+        expect_same_lists<std::uint32_t>(broken_meshes(), id_of_fragment{5}, part,
+                                         {.bodies = of, .repair = vp::repair::winding});
+    }
+    mesh_data closed;
+    add_box(closed, {3, 3, 3}, {21, 21, 21});
+    const drawing_of_bits whole{{closed}, {{}}, {{true}}};
+    whole.expect_same(box_grid({37, 26, 25}), {.repair = vp::repair::winding});
+}
+
 // A block takes as many triangles as it has threads, and several blocks share those of a small mesh.
 TEST(Solids, VotesOfMoreTrianglesThanABlockHasThreads) {
     const mesh_data all = tied_bodies(36.0f, 300, 11);
@@ -387,6 +408,7 @@ TEST(Solids, StreamsWithRepairs) {
     const vp::grid g = box_grid({37, 26, 25});
     for (const vp::solid_options& options :
          {vp::solid_options{.extent = vp::solid_extent::outer, .repair = vp::repair::close_holes},
+          vp::solid_options{.extent = vp::solid_extent::outer, .repair = vp::repair::winding},
           vp::solid_options{.repair = vp::repair::vote}, vp::solid_options{.repair = vp::repair::exterior},
           vp::solid_options{.repair = vp::repair::exterior, .closing = 2}}) {
         SCOPED_TRACE(static_cast<int>(options.repair));

@@ -65,7 +65,7 @@ TEST(DeviceSparseSolids, TilesAreTheCpus) {
     for (const vp::solid_options& o :
          {vp::solid_options{.rule = vp::fill_rule::even_odd}, vp::solid_options{.extent = vp::solid_extent::outer},
           vp::solid_options{.extent = vp::solid_extent::inner, .repair = vp::repair::close_holes},
-          vp::solid_options{.repair = vp::repair::vote}}) {
+          vp::solid_options{.repair = vp::repair::vote}, vp::solid_options{.repair = vp::repair::winding}}) {
         constant_pair p(extent);
         p.prepare(bits_and_labels);
         p.draw_solid(meshes, grid, o, "one body", constant_shader);

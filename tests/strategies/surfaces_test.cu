@@ -74,6 +74,7 @@ TEST(DeviceSurfaces, OfBadModelsHaveTheBytesOfTheCpu) {
         if (seed < 2) {
             expect_same(m, g, {.repair = vp::repair::exterior, .min_component = 9});
             expect_same(m, g, {.place = vp::place::corner, .repair = vp::repair::vote});
+            expect_same(m, g, {.repair = vp::repair::winding});
             expect_same(m, g, {.sample = vp::sample::corner, .bodies = vp::bodies::draw});
             expect_same(m, g, {.level = 0.05});
             expect_same(m, g, {.min_component = 9, .embedded = true});

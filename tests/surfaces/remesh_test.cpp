@@ -33,6 +33,7 @@ std::vector<vp::remesh_options> ways() {
             options{.repair = vp::repair::exterior},
             options{.repair = vp::repair::exterior, .closing = 1},
             options{.repair = vp::repair::vote},
+            options{.repair = vp::repair::winding},
             options{.level = 0.04}};
 }
 
@@ -263,6 +264,22 @@ TEST(Remesh, HolesAreClosedByConesWithTheirPlanes) {
     const host_surface open =
         remesh(backend, m, unit_grid(20), {.repair = vp::repair::close_holes, .max_hole_edges = 3});
     EXPECT_EQ(open.status.surface.cone_crossings, 0u);
+}
+
+// The box without two sides that meet: the surface is bent where the cone has an edge, and neither bulges out.
+TEST(Remesh, WindingNumbersCloseHolesSmoothly) {
+    vp::cpu_backend backend{2};
+    host_mesh m = box(glm::vec3(0.13f), glm::vec3(0.81f));
+    m.triangles.erase(m.triangles.begin(), m.triangles.begin() + 2);
+    m.triangles.resize(8);
+    const host_surface s = remesh(backend, m, unit_grid(20), {.repair = vp::repair::winding}),
+                       cone = remesh(backend, m, unit_grid(20), {.repair = vp::repair::close_holes});
+    EXPECT_TRUE(s.is_closed_manifold());
+    EXPECT_GT(s.status.surface.made_crossings, 0u) << "where neither mesh nor cone is";
+    EXPECT_NE(s.vertices.size(), cone.vertices.size());
+    EXPECT_EQ(
+        remesh(backend, m, unit_grid(20), {.rule = vp::fill_rule::even_odd, .repair = vp::repair::winding}).status.code,
+        vp::status_code::bad_solid_options);
 }
 
 TEST(Remesh, CrossingsThatNobodyHasAreCounted) {

@@ -117,6 +117,7 @@ TEST(GpuFiles, OfAModelWithEverythingInIt) {
                 {"a.npz"});
     const std::vector<std::vector<std::string>> repairs{{"--solid", "nonzero", "--close-holes"},
                                                         {"--solid", "even_odd", "--vote"},
+                                                        {"--solid", "nonzero", "--winding"},
                                                         {"--solid", "exterior", "--closing", "2", "--padding", "3"}};
     for (std::vector<std::string> repair : repairs) {
         repair.insert(repair.end(), {"-r", "70", "-t", all_targets});

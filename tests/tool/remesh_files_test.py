@@ -137,7 +137,7 @@ with tempfile.TemporaryDirectory() as name:
     meshes = 0
     for seed in range(12):
         write_obj(folder / "m.obj", *bad_model(seed))
-        for sign in ([], ["--close-holes"], ["--solid", "exterior", "--closing", "1"], ["--vote"]):
+        for sign in ([], ["--close-holes"], ["--solid", "exterior", "--closing", "1"], ["--vote"], ["--winding"]):
             place = ("corner", "mean", "sharp")[meshes % 3]
             outputs = [str(folder / "o.ply"), "-o", str(folder / "o.3mf")]
             command = [tool, str(folder / "m.obj"), "--remesh", "-r", "24", "--place", place, *sign, "-q", "-o", *outputs]

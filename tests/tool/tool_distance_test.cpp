@@ -161,7 +161,7 @@ TEST(Distance, SignIsByTheRuleAndTheRepairs) {
     ASSERT_EQ(0, open.code) << open.err;
     EXPECT_NE(std::string::npos, open.err.find("the sign of --distance: the model is not closed")) << open.err;
     for (const std::vector<std::string>& repair :
-         {std::vector<std::string>{"--close-holes"}, {"--vote"}, {"--vote", "--solid", "nonzero"}}) {
+         {std::vector<std::string>{"--close-holes"}, {"--vote"}, {"--vote", "--solid", "nonzero"}, {"--winding"}}) {
         const outcome result = measure(folder, holed, "closed.npy", repair);
         ASSERT_EQ(0, result.code) << result.err;
         const array closed = read_npy(folder / "closed.npy");
@@ -274,6 +274,8 @@ TEST(Distance, WhatDoesNotGoTogetherIsRefused) {
     refused({"-t", "distance"}, "distance goes with --distance");
     refused({"--distance", "--unsigned", "--solid", "nonzero"}, "--unsigned has no sign");
     refused({"--distance", "--unsigned", "--vote"}, "--unsigned has no sign");
+    refused({"--distance", "--unsigned", "--winding"}, "--unsigned has no sign");
+    refused({"--distance", "--solid", "even_odd", "--winding"}, "--winding does not go with --solid even_odd");
     refused({"--distance", "--unsigned", "--close-holes"}, "--unsigned has no sign");
     refused({"--distance", "-t", "count"}, "count does not go with --distance");
     refused({"--distance", "--coverage", "thin"}, "--coverage");

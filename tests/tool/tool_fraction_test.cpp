@@ -361,6 +361,7 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
     for (const std::string rule : {"even_odd", "positive", "each_draw", "exterior"})
         refused({"-t", "fraction", "--solid", rule}, "--solid " + rule + " and --target fraction do not go together");
     refused({"-t", "fraction", "--solid", "nonzero", "--vote"}, "--vote and --target fraction");
+    refused({"-t", "fraction", "--solid", "nonzero", "--winding"}, "--winding and --target fraction");
     refused({"--close-holes"}, "--close-holes goes with --solid, or with --target fraction");
     refused({"-t", "fraction", "--close-holes=0"}, "--close-holes takes the number of edges");
     refused({"-t", "fraction", "--solid", "nonzero", "--close-holes=few"}, "--close-holes takes the number of edges");

@@ -38,6 +38,7 @@ std::set<std::string> all_options() {
             "--solid-extent WHICH",
             "--close-holes [=EDGES]",
             "--vote",
+            "--winding",
             "--closing R",
             "--distance",
             "--band N|whole",

@@ -290,6 +290,10 @@ TEST(Solid, ModelsWithHolesAreRepaired) {
     EXPECT_EQ(1000U, solid({"--solid", "even_odd", "--vote"}, &messages));
     EXPECT_EQ("", messages);
     EXPECT_EQ(1000U, solid({"--solid", "nonzero", "--vote", "--work-memory", "1"}));
+    // In the plane of a missing side a point sees the box in half of all directions, beyond it in fewer.
+    EXPECT_EQ(1000U, solid({"--solid", "nonzero", "--winding"}, &messages));
+    EXPECT_EQ("", messages);
+    EXPECT_EQ(1000U, solid({"--solid", "positive", "--winding", "--work-memory", "1"}));
     // The flood comes in where the side is missing; what is left are five sides. A gap of 8 voxels needs R = 4.
     const std::size_t sides = 1000 - 9 * 8 * 8;
     EXPECT_EQ(sides, solid({"--solid", "exterior"}, &messages));
@@ -339,6 +343,13 @@ TEST(Solid, WhatDoesNotGoTogetherIsAUsageError) {
     expect({"--fill-color", "mean"}, "--fill goes with --solid");
     expect({"--fill", "body"}, "--fill goes with --solid");
     expect({"--vote"}, "--vote goes with --solid");
+    expect({"--winding"}, "--winding goes with --solid");
+    expect({"--solid", "even_odd", "--winding"},
+           "--winding does not go with --solid even_odd: a winding number of 1/2");
+    expect({"--solid", "each_draw", "--winding"}, "--winding does not go with --solid each_draw");
+    expect({"--solid", "exterior", "--winding"}, "--winding does not go with --solid exterior");
+    expect({"--solid", "nonzero", "--winding", "--vote"}, "--winding does not go with --vote");
+    expect({"--solid", "nonzero", "--winding", "--close-holes"}, "--winding does not go with --close-holes");
     expect({"--close-holes"}, "--close-holes goes with --solid");
     expect({"--closing", "1"}, "--closing goes with --solid");
     expect({"--solid", "nonzero", "--closing", "1"}, "--closing goes with --solid exterior");

@@ -115,6 +115,8 @@ TEST(StreamedSolids, VotesOfClosedAndOpenModels) {
         folder / "m.ply",
         {"--voxel-size", "0.02", "--origin", "0.3,0.1,0.4", "--extent", "30,50,30", "--solid", "nonzero", "--vote"}}
         .expect_equal(60);
+    two_ways{folder, folder / "m.ply", {"-r", "60", "--padding", "4", "--solid", "nonzero", "--winding"}}.expect_equal(
+        60);
     write_ball(folder / "m.ply", 0);
     two_ways{folder, folder / "m.ply", {"-r", "60", "--padding", "4", "--solid", "nonzero", "--vote"}}.expect_equal(60);
 }

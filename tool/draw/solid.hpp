@@ -63,8 +63,9 @@ struct solid_request {
     solid_extent extent = solid_extent::outer;
     // The most edges of a hole that gets a lid; 0: no hole gets one. Not with exterior and vote.
     std::uint64_t close_holes = 0;
-    bool vote = false; // most of the parities along x, y and z, whatever the rule; the extent is outer
-    int closing = 0;   // exterior: gaps of about twice as many voxels are closed
+    bool vote = false;    // most of the parities along x, y and z, whatever the rule; the extent is outer
+    bool winding = false; // by generalized winding numbers: lids on all holes, less their solid angles
+    int closing = 0;      // exterior: gaps of about twice as many voxels are closed
     // close_holes of a part of the model: the lids of each body (voxelpipe::solid_options::cones), not owned.
     const voxelpipe::core::hole_cones* cones = nullptr;
     // exterior and vote of a slab along z: what the other slabs decide (voxelpipe::solid_options::slab), not owned.

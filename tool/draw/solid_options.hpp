@@ -32,7 +32,7 @@ namespace voxelize {
     }
     if (request.vote) options.repair = vp::repair::vote;
     if (request.close_holes != 0) {
-        options.repair = vp::repair::close_holes;
+        options.repair = request.winding ? vp::repair::winding : vp::repair::close_holes;
         options.max_hole_edges = request.close_holes;
         options.cones = request.cones;
     }

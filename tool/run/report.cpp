@@ -169,6 +169,7 @@ void print_json(std::ostream& stream, const run_report& report) {
                          {"crossings", report.stats.solid->crossings},
                          {"max_winding", report.stats.solid->max_winding}};
         if (report.request.solid->vote) root["solid"]["vote"] = true;
+        if (report.request.solid->winding) root["solid"]["winding"] = true;
         if (report.stats.solid->is_examined) {
             const voxelpipe::flood_counters& flood = report.stats.solid->flood;
             root["solid"]["flood"] = {{"lost_voxels", flood.lost_voxels},

@@ -6,7 +6,7 @@
 // slabs, and given to the call of each slab (solid_options::cones and ::slab). Plain C++; a backend draws the cover.
 // Needs POSIX files.
 //
-//   close_holes   add() all triangles, begin();              of() each slab
+//   close_holes, and winding as well: add() all triangles, begin();              of() each slab
 //   vote          add() all triangles, begin();              enter() each slab with its triangles, of(), leave()
 //   exterior      begin(), add_walls() of all slabs, flood(); of() each slab
 
@@ -56,7 +56,7 @@ public:
     // the search, about; folder: for temporary files.
     solid_repairs(const grid& g, repair kind, std::uint64_t budget, std::string folder, unsigned threads)
         : grid_(g), kind_(kind), budget_(budget), folder_(std::move(folder)), threads_(threads) {
-        if (kind == repair::close_holes) holes_.emplace(0, budget, folder_);
+        if (core::has_cones(kind)) holes_.emplace(0, budget, folder_);
         if (kind == repair::vote) columns_.emplace(g);
     }
 
@@ -109,7 +109,7 @@ public:
     }
     // The options of a slab's call, valid until those of the next one are asked for, or leave().
     [[nodiscard]] solid_options of(const grid& slab, solid_options how) {
-        if (kind_ == repair::close_holes) how.cones = &cones_;
+        if (core::has_cones(kind_)) how.cones = &cones_;
         if (!is_along_z()) return how;
         if (columns_) bits_ = columns_->bits();
         if (exterior_) {

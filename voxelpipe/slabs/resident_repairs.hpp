@@ -45,20 +45,18 @@ public:
           bits_(slabs_.size()) {}
 
     // True if all triangles are to be added.
-    [[nodiscard]] static bool needs_triangles(repair kind) {
-        return kind == repair::close_holes || kind == repair::vote;
-    }
+    [[nodiscard]] static bool needs_triangles(repair kind) { return core::has_cones(kind) || kind == repair::vote; }
     // True if the slabs have to be along z.
     [[nodiscard]] static bool is_along_z(repair kind) { return kind == repair::vote || kind == repair::exterior; }
     // True if voxels of a slab may be inside although no triangle reaches it. Its call needs one that is dropped then.
     [[nodiscard]] static bool fills_without_triangles(repair kind) {
-        return kind == repair::close_holes || kind == repair::exterior;
+        return core::has_cones(kind) || kind == repair::exterior;
     }
 
     // All triangles of the mesh, wherever they lie, corners as they are drawn; their vertices are snapped in the grid,
     // and there. Once.
     void add(std::span<const core::snapped_position> vertices, const array_view<const glm::uvec3>& triangles) {
-        if (kind_ == repair::close_holes) find_edges(vertices, triangles);
+        if (core::has_cones(kind_)) find_edges(vertices, triangles);
         if (kind_ == repair::vote) find_columns(vertices, triangles);
     }
 
@@ -69,7 +67,7 @@ public:
     // Finds what of() gives for these options, which are valid for the grid. covers: the conservative cover of each
     // slab, see slab_exterior; none unless needs_walls(). Fails if the holes have too many vertices.
     [[nodiscard]] status find(const solid_options& how, std::span<const brick_table> covers) {
-        if (kind_ == repair::close_holes && closed_ != how.max_hole_edges) {
+        if (core::has_cones(kind_) && closed_ != how.max_hole_edges) {
             closed_.reset();
             try {
                 const core::snap_transform snap = core::make_snap_transform(grid_);
@@ -104,7 +102,7 @@ public:
     }
     // The options of a slab's call, valid until the next find(). Several threads may ask.
     [[nodiscard]] solid_options of(std::size_t slab, solid_options how) const {
-        if (kind_ == repair::close_holes) how.cones = &cones_;
+        if (core::has_cones(kind_)) how.cones = &cones_;
         if (is_along_z(kind_)) {
             how.slab = &bits_[slab];
             how.bodies = bodies::call; // one draw is one body

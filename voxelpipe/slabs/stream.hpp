@@ -132,7 +132,7 @@ public:
     // Slabs are along y or z, with vote and exterior along z. how.repair is that of stream_options; how.cones and
     // how.slab are found by the stream, and not given. Held beside the budget:
     //   close_holes   the boundaries of the holes and their cones, about 100 bytes a boundary edge, and a slab's call
-    //                 its own copy of the cones
+    //   or winding    its own copy of the cones
     //   vote          three layers of bits of the grid
     //   exterior      four layers of bits for each 8 layers of the grid at most, 40 layers more and 2 for each voxel of
     //                 `closing` (slab_exterior::least_bytes), and the cover of a slab in bricks. A crop is refused, as

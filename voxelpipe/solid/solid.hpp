@@ -6,6 +6,7 @@
 // is passed, exactly (docs/design.md, "Solids"). A solid is a coverage like the others: the same draws, vertex shaders,
 // targets, blends, layouts, crops and checks of arguments as voxelize; its shader gets a solid_fragment.
 
+#include <voxelpipe/core/seen_triangle.hpp>
 #include <voxelpipe/solid/core/crossing.hpp>
 #include <voxelpipe/voxelize.hpp>
 
@@ -38,11 +39,16 @@ enum class solid_extent : std::uint8_t {
 enum class repair : std::uint8_t {
     none,        // a hole casts its shadow along +x; solid_counters::open_rows tells
     close_holes, // a cone is put over each hole's boundary, before anything else
-    // The other two have an inside of their own, and what a triangle touches belongs to it: a rule or an extent that is
+    // The next two have an inside of their own, and what a triangle touches belongs to it: a rule or an extent that is
     // not solid_options' default is refused with status_code::bad_solid_options.
     // diagnose_repair (diagnose_repair.hpp) tells whether a flood took part of the inside.
     exterior, // what a flood from outside the grid does not reach through untouched voxels: fills cavities; no crops
     vote,     // what most of the closed rows along x, y and z call inside by even_odd; a tie is outside
+    // Where the generalized winding number is at least 1/2, or with fill_rule::nonzero its magnitude: the solid angles
+    // of all triangles over 4 pi, which across a hole falls smoothly. even_odd is refused with bad_solid_options, voxel
+    // sizes outside 2^-100 .. 2^100 with bad_voxel_size. Holes and their cones are those of close_holes; they do not
+    // belong to the cover. On a GPU a call takes 8 bytes a voxel and body.
+    winding,
 };
 
 // What repair::exterior and repair::vote take from the rest of the grid where a call draws a slab of it along z. Bits
@@ -65,10 +71,11 @@ struct solid_options {
     voxelpipe::repair repair = voxelpipe::repair::none; // of meshes that are not closed
     bool count_voxels = true;                           // fill counters::voxels
 
-    // close_holes: holes with more boundary edges than this stay open.
+    // close_holes, winding: holes with more boundary edges than this stay open.
     std::uint64_t max_hole_edges = std::numeric_limits<std::uint64_t>::max();
-    // close_holes of a part of a mesh: the cones of each body of the whole one, in host memory (slabs/holes.hpp), in
-    // place of those that this call would find. Null: found by the call. Like that, they need a triangle to be drawn.
+    // close_holes or winding of a part of a mesh: the cones of each body of the whole one, in host memory
+    // (slabs/holes.hpp), in place of those that this call would find. Null: found by the call. Like that, they need a
+    // triangle to be drawn.
     const core::hole_cones* cones = nullptr;
     // exterior: gaps of up to about twice as many voxels are closed, 0 to max_closing.
     int closing = 0;
@@ -84,9 +91,10 @@ inline constexpr solid_options each_draw{.rule = fill_rule::even_odd, .bodies = 
 // One voxel of one body: what a solid's shader gets. The order of fragments in a voxel, and their number in an
 // A-buffer, is the draw.
 struct solid_fragment {
-    glm::ivec3 voxel;     // index in the whole grid
-    std::uint32_t draw;   // which draw of the call; 0 with bodies::call
-    std::int64_t winding; // winding number of the voxel's centre; 0 is possible with outer; 0 with exterior, vote
+    glm::ivec3 voxel;   // index in the whole grid
+    std::uint32_t draw; // which draw of the call; 0 with bodies::call
+    std::int64_t
+        winding; // winding number of the voxel's centre; 0 is possible with outer; 0 with exterior, vote, winding
 };
 
 namespace core {
@@ -129,6 +137,9 @@ template <class Mesh, class VertexShader, class SolidShader, class Payload>
     return false;
 }
 
+// True if a repair puts cones over the boundaries of holes.
+[[nodiscard]] constexpr bool has_cones(repair kind) { return kind == repair::close_holes || kind == repair::winding; }
+
 // Names the calls of this module: a backend implements voxelize_solid as run_module(solid_tag, backend, draws, grid,
 // framebuffer_view or A-buffer, options, number of triangles), which argument-dependent lookup finds by the tag.
 struct solid_tag {};
@@ -144,13 +155,17 @@ inline constexpr bool takes_solid_slabs = requires {
 
 [[nodiscard]] inline status validate(const solid_options& o, const grid& g, bool takes_slabs = false) {
     const bool known = o.rule <= fill_rule::positive && o.bodies <= bodies::draw && o.extent <= solid_extent::inner &&
-                       o.repair <= repair::vote;
+                       o.repair <= repair::winding;
     if (!known || o.closing < 0 || o.closing > solid_options::max_closing)
         return failure(status_code::bad_solid_options);
     constexpr solid_options plain;
-    if (o.repair != repair::none && o.repair != repair::close_holes &&
+    if ((o.repair == repair::exterior || o.repair == repair::vote) &&
         (o.rule != plain.rule || o.extent != plain.extent))
         return failure(status_code::bad_solid_options);
+    if (o.repair == repair::winding) {
+        if (o.rule == fill_rule::even_odd) return failure(status_code::bad_solid_options);
+        if (!are_measurable(g.voxel_size)) return failure(status_code::bad_voxel_size);
+    }
     if (o.slab != nullptr) {
         if (!takes_slabs) return failure(status_code::strategy_unavailable);
         const bool has_bits = o.repair == repair::exterior

@@ -134,7 +134,7 @@ template <class Backend, class Mesh, class VertexShader, class Cells, class Shad
         return result;
     }
     std::vector<hole_cones> cones;
-    if (options.repair == repair::close_holes)
+    if (has_cones(options.repair))
         cones = run_module(find_holes_tag{}, backend, draws, samples, options.bodies, options.max_hole_edges);
     typename Backend::template buffer<edge_crossing> crossings(backend, cells.num_edges());
     typename Backend::template buffer<std::uint64_t> counts(backend,

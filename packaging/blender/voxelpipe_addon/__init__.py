@@ -186,6 +186,7 @@ class VOXELPIPE_OT_voxelize(bpy.types.Operator):
             ("close_holes", "Close", "Cones over the edges of holes"),
             ("exterior", "Flood", "All that the outside does not reach"),
             ("vote", "Vote", "The majority of rays along three axes"),
+            ("winding", "Winding number", "Where the mesh covers at least half of what a point sees"),
         ],
     )
     output: EnumProperty(

@@ -53,6 +53,8 @@ void add_distances(case_table<Backend>& cases) {
     vp::distance_options lids = band;
     lids.repair = vp::repair::close_holes;
     add("close_holes.open", of("open"), small, lids);
+    lids.repair = vp::repair::winding;
+    add("winding.open", of("open"), small, lids);
     vp::distance_options plain = band;
     plain.sign = vp::distance_sign::none;
     plain.band = vp::band::whole;

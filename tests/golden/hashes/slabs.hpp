@@ -77,7 +77,8 @@ void add_slabs(case_table<Backend>& cases) {
     }
     for (const auto& [name, repair] :
          {std::pair{"none", vp::repair::none}, std::pair{"close_holes", vp::repair::close_holes},
-          std::pair{"vote", vp::repair::vote}, std::pair{"exterior", vp::repair::exterior}})
+          std::pair{"vote", vp::repair::vote}, std::pair{"exterior", vp::repair::exterior},
+          std::pair{"winding", vp::repair::winding}})
         for (const char* const mesh : {"open", "shells"})
             cases.push_back(
                 {std::string("slabs.solid.") + name + '.' + mesh, [kind = repair, mesh](Backend& backend, digest& d) {

@@ -107,6 +107,13 @@ void add_solids(case_table<Backend>& cases) {
         o.max_hole_edges = 8;
         add("close_holes.few_edges" + name, bits, of(mesh), odd_grid(), o);
         o = {};
+        o.repair = vp::repair::winding;
+        add("winding.centre" + name, bits, of(mesh), odd_grid(), o);
+        add("winding.crop" + name, bits, of(mesh), crop_of_odd_grid(), o);
+        o.rule = vp::fill_rule::positive;
+        o.extent = vp::solid_extent::outer;
+        add("winding.positive" + name, values, of(mesh), odd_grid(), o);
+        o = {};
         o.repair = vp::repair::vote;
         add("vote" + name, bits, of(mesh), odd_grid(), o);
         add("vote.crop" + name, bits, of(mesh), crop_of_odd_grid(), o);

@@ -226,6 +226,10 @@ void describe_solids(CLI::App& app, raw_options& raw) {
                  "Inside is what most of the rows along x, y and z say, by whether they crossed the surface an odd "
                  "number of times; open rows abstain")
         ->group("Solids");
+    app.add_flag("--winding", raw.winding,
+                 "Inside is where the generalized winding number, the solid angle of the whole model over 4 pi, is at "
+                 "least 1/2: holes of an open model close smoothly. Not with even_odd and each_draw")
+        ->group("Solids");
     app.add_option("--closing", raw.closing,
                    "With --solid exterior: close gaps of about 2 R voxels for the flood. Default: 0")
         ->check(between(0, 64))

@@ -26,6 +26,7 @@ struct raw_options {
     std::string close_holes; // "all", or how many edges
     std::optional<int> closing;
     bool vote = false;
+    bool winding = false;
     bool distance = false;
     std::string band; // a number or "whole"
     bool is_unsigned = false;

@@ -122,6 +122,7 @@ void understand_solid(command_line& options, const raw_options& raw) {
     if (!raw.solid && !raw.distance && !raw.remesh) {
         const std::pair<const char*, bool> given[]{{"--solid-extent", raw.extent_of_solid.has_value()},
                                                    {"--vote", raw.vote},
+                                                   {"--winding", raw.winding},
                                                    {"--closing", raw.closing.has_value()},
                                                    {"--fill", !raw.fill.empty()}};
         for (const auto& [name, is_given] : given)
@@ -142,6 +143,18 @@ void understand_solid(command_line& options, const raw_options& raw) {
         throw usage_error(std::string("--vote does not go with --solid ") + to_string(solid.rule));
     if ((is_flood || raw.vote) && solid.extent != solid_extent::outer)
         throw usage_error(std::string(is_flood ? "--solid exterior" : "--vote") + " always has --solid-extent outer");
+    if (raw.winding) {
+        if (solid.rule == solid_rule::even_odd || solid.rule == solid_rule::each_draw)
+            throw usage_error(std::string("--winding does not go with --solid ") + to_string(solid.rule) +
+                              ": a winding number of 1/2 is neither even nor odd");
+        if (is_flood || raw.vote || !raw.close_holes.empty())
+            throw usage_error(std::string("--winding does not go with ") +
+                              (is_flood   ? "--solid exterior"
+                               : raw.vote ? "--vote"
+                                          : "--close-holes, whose lids it takes the angles of"));
+        solid.winding = true;
+        solid.close_holes = UINT64_MAX;
+    }
     if (!raw.close_holes.empty()) {
         if (is_flood || raw.vote)
             throw usage_error(std::string("--close-holes does not go with ") +
@@ -171,7 +184,7 @@ void understand_distance(command_line& options, const raw_options& raw) {
     distance.is_signed = !raw.is_unsigned;
     distance.at_corners = raw.corners;
     distance.iso = raw.iso;
-    if (raw.is_unsigned && (raw.solid || raw.vote || raw.closing || !raw.close_holes.empty()))
+    if (raw.is_unsigned && (raw.solid || raw.vote || raw.winding || raw.closing || !raw.close_holes.empty()))
         throw usage_error("--unsigned has no sign that --solid or a repair could decide: leave out one of them");
     if (raw.coverage) throw usage_error("--distance and --coverage do not go together: distances cover every sample");
     if (raw.extent_of_solid) throw usage_error("--solid-extent does not go with --distance: a sample is inside or not");
@@ -396,6 +409,8 @@ void understand_fractions(command_line& options, const raw_options& raw) {
                               "a voxel is measured by winding numbers, as they are. --solid nonzero beside it "
                               "decides on the other targets");
         if (request.solid->vote) throw usage_error("--vote" + together + "a voxel is measured by winding numbers");
+        if (request.solid->winding)
+            throw usage_error("--winding" + together + "a voxel is measured by whole winding numbers");
     }
     if (!raw.close_holes.empty()) options.voxelize.close_holes = edges_of_holes(raw);
     if (request.alpha == blend_alpha::cutoff)

@@ -5,8 +5,8 @@
 // distance_at on a GPU: run_module of core::distance_at_tag, with the bytes of cpu_backend. A warp takes a point, down
 // the tree of boxes to the formula; its sign by the triangles below it along x, and those that close holes.
 
-#include <voxelpipe/distance/core/row_crossing.hpp>
 #include <voxelpipe/distance/device/distance.cuh>
+#include <voxelpipe/solid/core/row_crossing.hpp>
 
 #include <cstdint>
 #include <limits>
@@ -36,6 +36,7 @@ struct point_call {
     fill_rule rule;
     bool has_sign;
     std::uint32_t num_draws, num_bodies;
+    const core::winding_view* trees; // of each body's holes, for repair::winding; else null
 };
 
 inline constexpr unsigned warps_of_points = 4;
@@ -105,23 +106,37 @@ __global__ __launch_bounds__(32 * warps_of_points) void find_points(const __grid
                 row.high[k] = at.c[k] + 0x1p-22f * magnitude(at.c[k]);
             }
             for (std::uint32_t body = 0; body < call.num_bodies && !is_inside; ++body) {
-                int winding = 0;
+                int winding = 0, of_cones = 0;
+                bool is_on_cone = false;
                 visit_runs(
                     t, row, stacks[warp], [] { return 1.0f; },
                     [&](std::uint32_t run) {
                         const std::uint64_t k = std::uint64_t{run} * 32 + lane;
-                        int own = 0;
+                        int own = 0, own_cones = 0;
+                        bool is_on = false;
                         if (k < t.num_primitives && in.frames[t.order[k]].is_wide != 2) {
                             const loaded_triangle tri = in.geo.load(t.order[k]);
                             const std::uint32_t of = tri.draw < call.num_draws ? tri.draw : tri.draw - call.num_draws;
-                            if (call.num_bodies == 1 || of == body) own = core::crossing_below(tri.a, tri.b, tri.c, p);
+                            if (call.num_bodies == 1 || of == body) {
+                                own = core::crossing_below(tri.a, tri.b, tri.c, p);
+                                if (call.trees != nullptr && tri.draw >= call.num_draws) {
+                                    own_cones = own;
+                                    is_on = core::is_on_triangle(tri.a, tri.b, tri.c, p);
+                                }
+                            }
                         }
                         __syncwarp();
                         winding += __reduce_add_sync(0xffffffffu, own);
+                        if (call.trees == nullptr) return;
+                        of_cones += __reduce_add_sync(0xffffffffu, own_cones);
+                        is_on_cone = is_on_cone || __any_sync(0xffffffffu, static_cast<int>(is_on)) != 0;
                     });
-                is_inside = call.rule == fill_rule::even_odd   ? winding % 2 != 0
-                            : call.rule == fill_rule::positive ? winding > 0
-                                                               : winding != 0;
+                is_inside =
+                    call.trees != nullptr
+                        ? core::is_inside_by_winding(call.trees[body], p, {winding, of_cones, is_on_cone}, call.rule)
+                    : call.rule == fill_rule::even_odd ? winding % 2 != 0
+                    : call.rule == fill_rule::positive ? winding > 0
+                                                       : winding != 0;
             }
         }
         if (lane == 0) {
@@ -202,7 +217,8 @@ template <class Mesh, class VertexShader, class Shader>
                                                           options.rule,
                                                           has_sign,
                                                           static_cast<std::uint32_t>(draws.size()),
-                                                          is_split ? static_cast<std::uint32_t>(draws.size()) : 1u};
+                                                          is_split ? static_cast<std::uint32_t>(draws.size()) : 1u,
+                                                          cones.trees.empty() ? nullptr : cones.trees[0].data()};
                             const glm::dvec3 size = g.voxel_size;
                             if (points.size() != 0) {
                                 device::find_points<typename draws_type::shading_type>

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Sinks of crossings: a list, or bits.
+// Sinks of crossings: a list, bits, or winding numbers.
 
 #include <voxelpipe/solid/device/crossing_list.cuh>
 #include <voxelpipe/solid/device/solid_source.cuh>
@@ -48,6 +48,27 @@ struct crossing_toggler {
             atomicXor(bits + row * words_x + x / 32, 1u << (x & 31));
         else
             atomicXor(odd_behind + row / 32, 1u << (row & 31));
+    }
+};
+
+// Adds to the first voxel behind the crossing, of its body; a later pass sums them up (solid/device/winding.cuh). A row
+// has a place a voxel, and one behind it.
+struct winding_adder {
+    static constexpr bool is_listing = false;
+    std::int32_t* windings;
+    std::int32_t* of_cones;  // what of it is of cones
+    std::uint64_t of_body;   // places
+    bool is_split;           // a body a draw
+    std::uint32_t num_draws; // the cones of body k are draw num_draws + k
+
+    __device__ VOXELPIPE_INLINE void emit(const row_grid& grid, unsigned long long, std::uint32_t draw,
+                                          std::uint64_t row, std::int64_t first, int winding) const {
+        const bool is_cone = draw >= num_draws;
+        const std::uint64_t body = is_cone ? draw - num_draws : is_split ? draw : 0;
+        const std::uint64_t row_places = static_cast<std::uint64_t>(grid.extent.x) + 1;
+        const std::uint64_t place = body * of_body + row * row_places + grid.position(first);
+        atomicAdd(windings + place, winding > 0 ? 1 : -1);
+        if (is_cone) atomicAdd(of_cones + place, winding > 0 ? 1 : -1);
     }
 };
 

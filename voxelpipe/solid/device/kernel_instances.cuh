@@ -13,6 +13,7 @@
 #define VOXELPIPE_SOLIDS(HOW)                                                                                          \
     VOXELPIPE_EMIT_CROSSINGS(HOW, crossing_appender, stored_triangles)                                                 \
     VOXELPIPE_EMIT_CROSSINGS(HOW, crossing_toggler, stored_triangles)                                                  \
+    VOXELPIPE_EMIT_CROSSINGS(HOW, winding_adder, stored_triangles)                                                     \
     VOXELPIPE_EMIT_CROSSINGS(HOW, crossing_appender, shaded_triangles<mesh_view<>, passthrough>)                       \
     VOXELPIPE_EMIT_CROSSINGS(HOW, crossing_toggler, shaded_triangles<mesh_view<>, passthrough>)                        \
     HOW void find_row_codes(const shaded_triangles<mesh_view<>, passthrough>&, const row_grid&, const zeroed_memory&,  \
@@ -27,7 +28,10 @@
     HOW void take_counts<0>(const cover_memory&, pipeline_state*, cudaStream_t);                                       \
     HOW void fill_to_exterior<0>(const exterior_memory&, word*, cudaStream_t);                                         \
     HOW void add_votes<0>(const vote_memory&, const stored_triangles&, std::uint32_t, std::uint32_t, const row_grid&,  \
-                          const solid_slab*, word*, pipeline_state*, cudaStream_t);
+                          const solid_slab*, word*, pipeline_state*, cudaStream_t);                                    \
+    HOW void add_windings<0>(const winding_memory&, const core::winding_view&, const geometry&,                        \
+                             const winding_triangles&, const row_grid&, fill_rule, solid_extent, std::uint32_t, word*, \
+                             pipeline_state*, cudaStream_t);
 
 #if defined(VOXELPIPE_LINKS_CUDA_KERNELS)
 namespace voxelpipe::device {

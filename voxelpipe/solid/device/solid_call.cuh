@@ -18,6 +18,7 @@
 #include <voxelpipe/solid/device/solid_cones.cuh>
 #include <voxelpipe/solid/device/solid_cover.cuh>
 #include <voxelpipe/solid/device/vote.cuh>
+#include <voxelpipe/solid/device/winding.cuh>
 
 #include <algorithm>
 #include <cstdint>
@@ -67,7 +68,8 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
     [[nodiscard]] bool has_cover() const { return makes_sets() || plan.options.extent != solid_extent::centre; }
     // Bodies are sets of voxels that no crossings are swept for.
     [[nodiscard]] bool makes_sets() const {
-        return plan.options.repair == repair::exterior || plan.options.repair == repair::vote;
+        return plan.options.repair == repair::exterior || plan.options.repair == repair::vote ||
+               plan.options.repair == repair::winding;
     }
     // A body a draw, of several.
     [[nodiscard]] bool is_split() const { return plan.options.bodies == bodies::draw && draws.size() > 1; }
@@ -92,6 +94,7 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         cover_memory cover;
         exterior_memory exterior;
         vote_memory vote;
+        winding_memory winding;
     };
     // Crossings toggle bits, are grouped by row, or go into one list that is sorted, and the cover with them.
     enum class crossing_use { toggles, groups, sorts };
@@ -119,6 +122,7 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         if (plan.options.repair == repair::exterior && plan.options.slab == nullptr)
             m.exterior = exterior_memory::take(a, plan.g.extent, plan.options.closing);
         if (plan.options.repair == repair::vote) m.vote = vote_memory::take(a, plan.g.extent);
+        if (plan.options.repair == repair::winding) m.winding = winding_memory::take(a, rows(), num_bodies());
         return m;
     }
     [[nodiscard]] body_shaders<SolidShader> shaders(const memory& m, cudaStream_t stream) const {
@@ -225,7 +229,7 @@ private:
         for (std::size_t d = 0; d < draws.size(); d = is_split() ? d + 1 : draws.size())
             f(is_split() ? static_cast<std::uint32_t>(d) : 0u, d, is_split() ? d + 1 : draws.size());
     }
-    // The mask of a body's cover, with its cones.
+    // The mask of a body's cover, with the cones of repair::close_holes.
     void cover_body(const memory& m, const geometry& geo, const std::vector<draw_geometry>& geometry_of,
                     std::uint32_t body, std::size_t first, std::size_t last, pipeline_state* state,
                     cudaStream_t stream) const {
@@ -233,18 +237,34 @@ private:
         for (std::size_t d = first; d < last; ++d)
             raster_cover(m.cover, geometry_of[d], static_cast<std::uint32_t>(draws[d].mesh.num_triangles()), geo,
                          plan.g, state, stream);
-        if (!cones.empty())
+        if (plan.options.repair == repair::close_holes)
             raster_cover(m.cover, geometry_of[draws.size() + body], cones[body].num_triangles, geo, plan.g, state,
                          stream);
     }
-    // Bodies that repair::exterior or repair::vote decides, as runs of cover, or of one body as the mask. Waits.
+    // Bodies that repair::exterior, vote or winding decides, as runs of cover, or of one body as the mask. Waits.
     void emit_sets(const memory& m, const crossing_list& list, pipeline_state* state, cudaStream_t stream) const {
         std::vector<draw_geometry> geometry_of;
         const geometry geo = shade(m, geometry_of, stream);
         m.cover.start(stream);
+        const bool is_winding = plan.options.repair == repair::winding;
+        if (is_winding) {
+            m.winding.clear(rows(), num_bodies(), stream);
+            const winding_adder sink{m.winding.windings, m.winding.of_cones, m.winding.of_body(rows()), is_split(),
+                                     static_cast<std::uint32_t>(draws.size())};
+            emit_crossings(stored_triangles{geo, rows(), plan.num_primitives, num_drawn(geometry_of)}, rows(), sink,
+                           m.kept.with(state), state, stream);
+        }
         for_each_body([&](std::uint32_t body, std::size_t first, std::size_t last) {
-            cover_body(m, geo, geometry_of, body, first, last, state, stream);
-            if (plan.options.repair == repair::exterior && plan.options.slab != nullptr) {
+            if (!is_winding || plan.options.extent != solid_extent::centre)
+                cover_body(m, geo, geometry_of, body, first, last, state, stream);
+            if (is_winding) {
+                // Behind the draws are the cones, body by body.
+                const std::uint32_t first_cone = geometry_of[draws.size() + body].first_primitive;
+                const winding_triangles of_body{geometry_of[first].first_primitive, geometry_of[last].first_primitive,
+                                                first_cone, first_cone + cones[body].num_triangles};
+                add_windings(m.winding, cones[body].tree, geo, of_body, rows(), plan.options.rule, plan.options.extent,
+                             body, m.cover.mask, state, stream);
+            } else if (plan.options.repair == repair::exterior && plan.options.slab != nullptr) {
                 // The cover has counted the triangles; the inside is known.
                 copy_from_slab(m.cover.mask, plan.options.slab->inside, {plan.g.extent}, plan.g.extent.z, stream);
             } else if (plan.options.repair == repair::exterior) {

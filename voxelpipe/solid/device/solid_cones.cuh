@@ -2,12 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// repair::close_holes: the snapped mesh goes to the host once, which finds the holes and their cones
-// (solid/core/holes.hpp), and the cones come back as further triangles of each body.
+// repair::close_holes and repair::winding: the snapped mesh goes to the host once, which finds the holes and their
+// cones (solid/core/holes.hpp), and the cones come back as further triangles of each body; for repair::winding with a
+// tree over the holes.
 
 #include <voxelpipe/device/base/device_buffer.cuh>
 #include <voxelpipe/device/scene/scene_memory.cuh>
 #include <voxelpipe/solid/core/holes.hpp>
+#include <voxelpipe/solid/core/winding_lids.hpp>
 #include <voxelpipe/solid/solid.hpp>
 
 #include <cstdint>
@@ -23,6 +25,7 @@ namespace voxelpipe::device {
 struct cone_part {
     draw_geometry geometry; // first_primitive is unset
     std::uint32_t num_triangles = 0;
+    core::winding_view tree{}; // repair::winding: of the same holes
 };
 
 // The cones of a call, and their memory.
@@ -35,6 +38,9 @@ struct solid_cones {
     std::vector<device_buffer<core::snapped_position>> positions;
     std::vector<device_buffer<int32_position>> near;
     std::vector<device_buffer<glm::uvec3>> triangles;
+    std::vector<device_buffer<core::winding_node>> nodes, holes;
+    std::vector<device_buffer<core::snapped_position>> lids, corners;
+    std::vector<device_buffer<core::winding_view>> trees; // repair::winding: one array, of the parts' trees
 };
 
 template <class T>
@@ -112,8 +118,24 @@ template <class Mesh, class VertexShader, class SolidShader>
                          {exact_memory.data(), near_memory.data()},
                          0,
                          num_vertices};
+        if (options.repair == repair::winding) {
+            const core::winding_tree tree(
+                cones, core::make_distance_scale(g.voxel_size, core::make_snap_transform(g).fraction));
+            using nodes_view = array_view<const core::winding_node>;
+            auto& nodes = made.nodes.emplace_back(from, nodes_view(tree.nodes().data(), tree.nodes().size()));
+            auto& holes = made.holes.emplace_back(from, nodes_view(tree.holes().data(), tree.holes().size()));
+            auto& lids = made.lids.emplace_back(from, positions_view(tree.lids().data(), tree.lids().size()));
+            auto& corners =
+                made.corners.emplace_back(from, positions_view(tree.corners().data(), tree.corners().size()));
+            part.tree = tree.view(nodes.data(), lids.data(), holes.data(), corners.data());
+        }
         made.parts.push_back(part);
         made.num_triangles += cones.triangles.size();
+    }
+    if (options.repair == repair::winding) {
+        std::vector<core::winding_view> trees;
+        for (const cone_part& part : made.parts) trees.push_back(part.tree);
+        made.trees.emplace_back(from, array_view<const core::winding_view>(trees.data(), trees.size()));
     }
     return made;
 }
@@ -124,7 +146,7 @@ template <class Mesh, class VertexShader, class SolidShader, class Run>
                                 const grid& g, const solid_options& options, std::uint64_t triangles_in,
                                 const Run& run) {
     solid_cones cones;
-    if (options.repair == repair::close_holes) {
+    if (core::has_cones(options.repair)) {
         status failed;
         failed.counts.triangles_in = triangles_in;
         failed.where = stage::coarse_raster;

@@ -38,7 +38,7 @@ struct sample_bricks {
     const std::uint32_t* values = nullptr; // by rank, of the bits
 
     [[nodiscard]] VOXELPIPE_HD std::uint64_t num_bricks() const { return field.table.count + bits.table.count; }
-    // The brick or the tile at a place in the whole grid, counted in bricks; none where there is none.
+    // The brick or the tile at a place in the whole grid, counted in bricks, or `none`.
     [[nodiscard]] VOXELPIPE_HD std::uint64_t find(int x, int y, int z) const {
         if (x < 0 || y < 0 || z < 0) return none;
         const std::uint64_t key = morton_key(x, y, z);

@@ -117,7 +117,7 @@ public:
         view_.field.table.extent = view.table.extent;
         backend.for_each(bits.num_bricks(), passes::read_bit_bricks{view.table, view_.values, bit_layers_.data()});
     }
-    // A field besides: its bricks, read by `lookup`, take the place of those of the bits. Counts what is no number.
+    // A field besides: its bricks, read by `lookup`, take the place of those of the bits. NaN samples are counted.
     template <class Field>
     void add(Backend& backend, const Field& field, const brick_lookup& lookup, double level,
              std::uint64_t* nan_samples) {

@@ -1,0 +1,595 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// repair::winding: its formula against libm in long double, and every sample of open meshes against an oracle that sums
+// the solid angles of the given triangles and knows of no cones.
+
+#include "solid_support.hpp"
+
+#include <voxelpipe/solid/core/winding_bricks.hpp>
+#include <voxelpipe/solid/core/winding_lids.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+namespace solids {
+namespace {
+
+namespace core = voxelpipe::core;
+using real = long double;
+
+constexpr vp::solid_options by_winding{.repair = vp::repair::winding};
+
+mesh less_triangles(const mesh& m, splitmix64& random, int count) {
+    mesh r = m;
+    for (int i = 0; i < count && !r.triangles.empty(); ++i)
+        r.triangles.erase(r.triangles.begin() + static_cast<std::ptrdiff_t>(random.below(r.triangles.size())));
+    return r;
+}
+// The faces whose middle is below `z`.
+mesh below(const mesh& m, float z) {
+    mesh r{m.positions, {}};
+    for (const glm::uvec3& t : m.triangles)
+        if (m.positions[t.x].z + m.positions[t.y].z + m.positions[t.z].z < 3.0f * z) r.triangles.push_back(t);
+    return r;
+}
+const mesh sides = box({3.25f, 3.5f, 4.0f}, {11.25f, 12.5f, 10.0f}); // two pass through centres of unit voxels
+mesh less_faces(mesh m, std::vector<std::size_t> faces) {
+    std::sort(faces.rbegin(), faces.rend());
+    for (const std::size_t f : faces) {
+        const auto at = m.triangles.begin() + static_cast<std::ptrdiff_t>(2 * f);
+        m.triangles.erase(at, at + 2);
+    }
+    return m;
+}
+mesh soup(splitmix64& random, int count, float extent) {
+    mesh r;
+    for (int i = 0; i < count; ++i) {
+        for (int n = 0; n < 3; ++n) {
+            const auto at = [&] { return static_cast<float>(random.uniform(0.0, extent)); };
+            r.positions.push_back({at(), at(), at()});
+        }
+        const auto first = static_cast<std::uint32_t>(3 * i);
+        r.triangles.push_back({first, first + 1, first + 2});
+    }
+    return r;
+}
+
+// ---- the formula ----------------------------------------------------------------------------------------------------
+
+TEST(SolidAngles, TheArctangentIsThatOfTheLibraryToFourUnits) {
+    splitmix64 random(1);
+    for (int i = 0; i < 20000; ++i) {
+        const double angle = random.uniform(-3.2, 3.2),
+                     length = std::ldexp(1.0, static_cast<int>(random.between(-200, 200)));
+        double y = std::sin(angle) * length, x = std::cos(angle) * length;
+        if (i % 16 == 0) y *= std::ldexp(1.0, -static_cast<int>(random.below(300)));
+        if (i % 16 == 1) x *= std::ldexp(1.0, -static_cast<int>(random.below(300)));
+        if (i % 16 == 2) x = y;
+        const real exact = std::atan2(static_cast<real>(y), static_cast<real>(x));
+        ASSERT_NEAR(static_cast<double>(core::written_atan2(y, x) - exact), 0.0, 0x1p-51) << y << " " << x;
+    }
+    EXPECT_EQ(core::written_atan2(0.0, 1.0), 0.0);
+    EXPECT_EQ(core::written_atan2(2.0, 0.0), 0.5 * core::pi_as_double);
+    EXPECT_EQ(core::written_atan2(-1.0, 0.0), -0.5 * core::pi_as_double);
+    EXPECT_EQ(core::written_atan2(3.0, -3.0), 0.75 * core::pi_as_double);
+}
+
+// Half the solid angle by the sphere's triangle, in long double from exact integers.
+real half_angle(const core::snapped_position (&v)[3], const core::snapped_position& p, const glm::dvec3& size) {
+    vp::int128 q[3][3];
+    for (int n = 0; n < 3; ++n) {
+        q[n][0] = v[n].x - p.x;
+        q[n][1] = v[n].y - p.y;
+        q[n][2] = v[n].z - p.z;
+    }
+    real cross[3][3], length[3];
+    vp::int128 volume = 0;
+    for (int n = 0; n < 3; ++n) {
+        real square = 0;
+        for (int k = 0; k < 3; ++k) {
+            const int u = (k + 1) % 3, w = (k + 2) % 3, m = (n + 1) % 3;
+            const vp::int128 c = q[n][u] * q[m][w] - q[n][w] * q[m][u];
+            cross[n][k] = static_cast<real>(c) * static_cast<real>(size[u]) * static_cast<real>(size[w]);
+            if (n == 1) volume += c * q[0][k];
+            const real x = static_cast<real>(q[n][k]) * static_cast<real>(size[k]);
+            square += x * x;
+        }
+        length[n] = std::sqrt(square);
+    }
+    const real det =
+        static_cast<real>(volume) * static_cast<real>(size.x) * static_cast<real>(size.y) * static_cast<real>(size.z);
+    real sum = -std::acos(-1.0L);
+    for (int n = 0; n < 3; ++n) {
+        const int before = (n + 2) % 3;
+        real along = 0;
+        for (int k = 0; k < 3; ++k) along -= cross[n][k] * cross[before][k];
+        sum += std::atan2(length[n] * std::abs(det), along);
+    }
+    return det < 0 ? -sum / 2 : sum / 2;
+}
+
+TEST(SolidAngles, AnglesAreThoseOfLongDoubleAlsoBesideEdgesAndVertices) {
+    splitmix64 random(2);
+    const glm::dvec3 sizes[] = {{1.0, 1.0, 1.0}, {0.3, 1.0, 7.0}, {1e-20, 3e-20, 2e-20}};
+    int beside_edges = 0;
+    for (int i = 0; i < 30000; ++i) {
+        const glm::dvec3 size = sizes[i % 3];
+        const int fraction = 8;
+        const std::int64_t most = i % 2 == 0 ? 1 << 12 : std::int64_t{1} << (i % 7 == 0 ? 38 : 23);
+        core::snapped_position v[3];
+        for (auto& p : v) p = {random.between(0, most), random.between(0, most), random.between(0, most)};
+        core::snapped_position p{random.between(0, most), random.between(0, most), random.between(0, most)};
+        if (i % 4 == 1) { // a unit or two off an edge
+            const auto along = [&](std::int64_t a, std::int64_t b) { return (a + b) / 2 + random.between(-1, 1); };
+            p = {along(v[0].x, v[1].x), along(v[0].y, v[1].y), along(v[0].z, v[1].z)};
+            ++beside_edges;
+        }
+        if (i % 4 == 2)
+            p = {v[2].x + random.between(-1, 1), v[2].y + random.between(-1, 1), v[2].z + random.between(-1, 1)};
+        const core::distance_scale scale = core::make_distance_scale(size, fraction);
+        const core::seen_angle wide = core::find_angle(core::see_wide(v[0], v[1], v[2], p), scale);
+        const core::seen_triangle seen = core::see_corners(
+            v[0], v[1], v[2], p, core::is_narrow_in_grid(v[0], v[1], v[2]) && core::is_narrow_in_grid(p, p, p));
+        const core::seen_angle angle = core::find_angle(seen, scale);
+        ASSERT_EQ(angle.half, wide.half) << "both forms of the integers";
+        if (seen.volume == 0.0) continue;
+        ASSERT_NEAR(static_cast<double>(angle.half - half_angle(v, p, size)), 0.0, 0x1p-45) << i;
+        // Turned triangles and exchanged vertices.
+        const core::seen_angle turned = core::find_angle(core::see_wide(v[1], v[2], v[0], p), scale),
+                               swapped = core::find_angle(core::see_wide(v[1], v[0], v[2], p), scale);
+        ASSERT_NEAR(turned.half, angle.half, 0x1p-44);
+        ASSERT_NEAR(swapped.half, -angle.half, 0x1p-44);
+    }
+    EXPECT_GT(beside_edges, 7000);
+}
+
+TEST(SolidAngles, APointOfTheClosedTriangleIsOnItAndOthersOfItsPlaneSeeNothing) {
+    const core::distance_scale scale = core::make_distance_scale(glm::dvec3(1.0), 4);
+    const core::snapped_position a{0, 0, 0}, b{8, 0, 4}, c{0, 8, 4};
+    const auto see = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+        return core::find_angle(core::see_wide(a, b, c, {x, y, z}), scale);
+    };
+    for (const auto& on : {a, b, c, core::snapped_position{2, 2, 2}, core::snapped_position{4, 4, 4}}) {
+        EXPECT_TRUE(see(on.x, on.y, on.z).is_on);
+        EXPECT_EQ(see(on.x, on.y, on.z).half, 0.0);
+    }
+    EXPECT_FALSE(see(8, 8, 8).is_on);
+    EXPECT_EQ(see(8, 8, 8).half, 0.0);
+    EXPECT_FALSE(see(-2, 0, -1).is_on);
+    EXPECT_FALSE(see(2, 2, 3).is_on);
+    EXPECT_NE(see(2, 2, 3).half, 0.0);
+    const auto flat = core::find_angle(core::see_wide(a, b, {16, 0, 8}, {4, 0, 2}), scale);
+    EXPECT_FALSE(flat.is_on) << "a triangle without area";
+    EXPECT_EQ(flat.half, 0.0);
+}
+
+TEST(SolidAngles, SumsOfClosedMeshesAreWholeToTheirFixedPoint) {
+    const vp::grid g = unit_grid(glm::ivec3(32));
+    const mesh m = sphere(glm::vec3(16.1f, 15.7f, 16.3f), 11.0f, 3);
+    const core::distance_scale scale = core::make_distance_scale(g.voxel_size, g.fraction());
+    const auto n = static_cast<std::uint32_t>(m.triangles.size());
+    const int bits = core::angle_bits(n);
+    EXPECT_EQ(core::angle_bits(1023), 52);
+    EXPECT_EQ(core::angle_bits(1024), 51);
+    EXPECT_EQ(core::angle_bits(1), 52);
+    EXPECT_EQ(core::angle_bits(~0u), 30);
+    splitmix64 random(3);
+    const auto snapped = snap(m, g);
+    for (int i = 0; i < 50; ++i) {
+        const auto any = [&] { return (2 * random.between(0, 31) + 1) << (g.fraction() - 1); };
+        const core::snapped_position p{any(), any(), any()};
+        std::int64_t sum = 0;
+        for (const auto& t : snapped)
+            sum += core::angle_units(
+                core::find_angle(core::see_wide({t.v[0][0], t.v[0][1], t.v[0][2]}, {t.v[1][0], t.v[1][1], t.v[1][2]},
+                                                {t.v[2][0], t.v[2][1], t.v[2][2]}, p),
+                                 scale)
+                    .half,
+                bits);
+        const double w = std::ldexp(static_cast<double>(sum), -bits);
+        EXPECT_NEAR(w, std::round(w), n * 0x1p-47);
+        EXPECT_TRUE(std::round(w) == 0.0 || std::round(w) == 1.0);
+    }
+}
+
+TEST(SolidAngles, AHalfIsInsideToTheLastBit) {
+    constexpr auto nonzero = vp::fill_rule::nonzero, positive = vp::fill_rule::positive;
+    constexpr std::int64_t half = std::int64_t{1} << 39; // of 40 bits
+    for (std::int64_t k = -3; k <= 3; ++k)
+        for (std::int64_t n = -8; n <= 8; ++n)
+            for (std::int64_t off = -1; off <= 1; ++off) {
+                const std::int64_t sum = n * half + off;
+                const real w = static_cast<real>(k) - static_cast<real>(sum) / static_cast<real>(2 * half);
+                EXPECT_EQ(core::is_inside_by_sum(positive, k, sum, 40), w >= 0.5L) << k << " " << n << " " << off;
+                EXPECT_EQ(core::is_inside_by_sum(nonzero, k, sum, 40), std::abs(w) >= 0.5L)
+                    << k << " " << n << " " << off;
+            }
+}
+
+// ---- sets -----------------------------------------------------------------------------------------------------------
+
+struct comparison {
+    std::size_t samples = 0, left_out = 0, on_surface = 0, wrong = 0, flipped = 0;
+};
+
+// Compares every sample. `flipped` counts those at which the cones alone decide otherwise.
+void compare(const mesh& m, const vp::grid& g, vp::fill_rule rule, comparison& sum) {
+    vp::solid_options o = by_winding;
+    o.rule = rule;
+    const voxel_set found = library_solid(m, g, o).voxels;
+    o.repair = vp::repair::close_holes;
+    const voxel_set closed = library_solid(m, g, o).voxels;
+    const auto triangles = snap(m, g);
+    for (int z = 0; z < g.extent.z; ++z)
+        for (int y = 0; y < g.extent.y; ++y)
+            for (int x = 0; x < g.extent.x; ++x) {
+                const auto w = oracle::find_generalized_winding(
+                    g.fraction(), triangles, {g.voxel_size.x, g.voxel_size.y, g.voxel_size.z}, {x, y, z});
+                const std::size_t i = index(g.extent, x, y, z);
+                ++sum.samples;
+                sum.on_surface += w.is_on_surface ? 1 : 0;
+                const real size = rule == vp::fill_rule::nonzero ? std::abs(w.number) : w.number;
+                if (w.is_on_surface || std::abs(size - 0.5L) < 1e-9L + w.doubt) {
+                    ++sum.left_out;
+                    continue;
+                }
+                if ((found[i] != 0) != (size > 0.5L)) ++sum.wrong;
+                if (found[i] != closed[i]) ++sum.flipped;
+            }
+}
+
+TEST(Winding, EverySampleOfOpenSpheresIsThatOfTheSolidAngles) {
+    splitmix64 random(11);
+    comparison sum;
+    for (int i = 0; i < 6; ++i) {
+        const auto at = [&] { return static_cast<float>(random.uniform(7.0, 9.0)); };
+        const mesh whole = sphere({at(), at(), at()}, static_cast<float>(random.uniform(4.0, 7.0)), 2);
+        const mesh open =
+            i < 3 ? less_triangles(whole, random, 20 + 30 * i) : below(whole, 6.0f + 2.0f * static_cast<float>(i - 3));
+        compare(i % 2 == 0 ? open : open.inside_out(), unit_grid(glm::ivec3(17, 16, 15)),
+                i % 3 == 2 ? vp::fill_rule::positive : vp::fill_rule::nonzero, sum);
+    }
+    EXPECT_EQ(sum.wrong, 0u) << "of " << sum.samples;
+    EXPECT_LT(sum.left_out, sum.samples / 100);
+    EXPECT_GT(sum.flipped, 100u) << "cones would do";
+}
+
+TEST(Winding, EverySampleOfSoupsIsThatOfTheSolidAngles) {
+    splitmix64 random(12);
+    comparison sum;
+    for (int i = 0; i < 8; ++i) {
+        mesh m = soup(random, 3 + 12 * i, 14.0f);
+        if (i % 2 == 1) m.add(sphere(glm::vec3(7.0f), 5.0f, 1)).add(below(sphere(glm::vec3(8.0f), 5.0f, 1), 8.0f));
+        compare(m, unit_grid(glm::ivec3(14)), i % 4 < 2 ? vp::fill_rule::nonzero : vp::fill_rule::positive, sum);
+    }
+    EXPECT_EQ(sum.wrong, 0u) << "of " << sum.samples;
+    EXPECT_LT(sum.left_out, sum.samples / 100);
+    EXPECT_GT(sum.flipped, 100u);
+}
+
+TEST(Winding, EverySampleOfOpenBoxesIsThatOfTheSolidAngles) {
+    comparison sum;
+    for (std::size_t face = 0; face < 6; ++face)
+        compare(less_faces(sides, {face}), unit_grid(glm::ivec3(15)), vp::fill_rule::nonzero, sum);
+    EXPECT_EQ(sum.wrong, 0u) << "of " << sum.samples;
+    EXPECT_GT(sum.on_surface, 100u) << "faces through centres";
+    EXPECT_LT(sum.left_out - sum.on_surface, sum.samples / 50) << "in the plane of a missing face the number is 1/2";
+    EXPECT_EQ(sum.flipped, 0u) << "which is that of the cone";
+    for (std::size_t face = 0; face < 4; ++face)
+        compare(less_faces(sides, {face, face == 3 ? 5 : face + 2}), unit_grid(glm::ivec3(15)), vp::fill_rule::nonzero,
+                sum);
+    EXPECT_EQ(sum.wrong, 0u) << "of " << sum.samples;
+    EXPECT_GT(sum.flipped, 50u);
+}
+
+TEST(Winding, AnglesAreThoseOfTheWorldNotOfTheVoxels) {
+    comparison sum;
+    const vp::grid g = {{0, 0, 0}, {0.25, 1.0, 0.5}, {60, 14, 28}};
+    compare(less_faces(sides, {1, 4}), g, vp::fill_rule::nonzero, sum);
+    compare(less_faces(sides, {2, 5}), g, vp::fill_rule::positive, sum);
+    EXPECT_EQ(sum.wrong, 0u);
+    EXPECT_GT(sum.flipped, 100u);
+}
+
+TEST(Winding, ClosedMeshesKeepTheirVoxelsAndExtentsAddTheCoverOfTheMeshAlone) {
+    const vp::grid g = unit_grid(glm::ivec3(16));
+    splitmix64 random(13);
+    const mesh closed = random_bodies(random, 16, 4);
+    EXPECT_EQ(library_solid(closed, g, by_winding).voxels, library_solid(closed, g).voxels);
+    const mesh open = below(sphere(glm::vec3(8.0f), 6.0f, 2), 9.0f);
+    const voxel_set centre = library_solid(open, g, by_winding).voxels, cover = library_cover(open, g);
+    vp::solid_options o = by_winding;
+    o.extent = vp::solid_extent::outer;
+    EXPECT_EQ(library_solid(open, g, o).voxels, united(centre, cover));
+    o.extent = vp::solid_extent::inner;
+    EXPECT_EQ(library_solid(open, g, o).voxels, without(centre, cover));
+    EXPECT_NE(centre, united(centre, cover));
+    EXPECT_NE(centre, without(centre, cover));
+}
+
+TEST(Winding, ASampleOnACapTakesTheVerdictOfItsRow) {
+    const vp::grid g = unit_grid(glm::ivec3(16));
+    for (const float lid : {10.5f, 10.0f}) { // through centres, and between them
+        mesh m = box({3, 3, 3}, {13, 13, lid});
+        const voxel_set closed = library_solid(m, g).voxels; // the cone lies in the plane of the lid
+        std::erase_if(m.triangles, [&](const glm::uvec3& t) {
+            return m.positions[t.x].z == lid && m.positions[t.y].z == lid && m.positions[t.z].z == lid;
+        });
+        ASSERT_EQ(m.triangles.size(), 10u);
+        const voxel_set found = library_solid(m, g, by_winding).voxels;
+        // The number is 1/2 in the plane of the lid, and more below.
+        EXPECT_EQ(found, closed);
+        EXPECT_EQ(closed[index(g.extent, 8, 8, 9)], 1);
+    }
+}
+
+TEST(Winding, BodiesDrawsAndCountsAreThoseOfClosedHoles) {
+    const vp::grid g = unit_grid(glm::ivec3(20, 18, 16));
+    const std::vector<mesh> draws{below(sphere(glm::vec3(8.0f), 6.0f, 2), 9.0f), box({9, 9, 2}, {15, 15, 9}),
+                                  below(sphere({13.0f, 8.0f, 8.0f}, 5.0f, 1).inside_out(), 8.0f)};
+    voxel_set all(count(voxel_set(index(g.extent, 0, 0, g.extent.z), 1)), 0);
+    for (const mesh& m : draws) all = united(all, library_solid(m, g, by_winding).voxels);
+    vp::solid_options o = by_winding;
+    o.bodies = vp::bodies::draw;
+    const solid apart = library_solid(draws, g, o);
+    EXPECT_EQ(apart.voxels, all);
+    vp::solid_options closing = o;
+    closing.repair = vp::repair::close_holes;
+    const vp::solid_counters expected = library_solid(draws, g, closing).status.solid;
+    EXPECT_EQ(apart.status.solid, expected);
+    EXPECT_EQ(expected.holes, 2u);
+    EXPECT_EQ(apart.status.counts.triangles_in,
+              expected.cones == 2 ? draws[0].triangles.size() + 12 + draws[2].triangles.size() : 0);
+    EXPECT_EQ(library_solid(draws, g, o, 1).voxels, all) << "one thread";
+}
+
+TEST(Winding, CropsAreCropsOfTheWhole) {
+    const vp::grid g = unit_grid(glm::ivec3(45, 20, 18));
+    splitmix64 random(14);
+    mesh m = less_triangles(sphere({20.0f, 9.0f, 9.0f}, 8.0f, 2), random, 60);
+    m.add(below(sphere({30.0f, 10.0f, 9.0f}, 7.0f, 2), 10.0f));
+    const voxel_set whole = library_solid(m, g, by_winding).voxels;
+    const glm::ivec3 crops[][2] = {{{0, 0, 7}, {45, 20, 5}}, {{13, 3, 2}, {19, 11, 16}}, {{33, 0, 0}, {12, 20, 18}}};
+    for (const auto& [offset, extent] : crops) {
+        const vp::grid part = g.crop(offset, extent);
+        const voxel_set found = library_solid(m, part, by_winding).voxels;
+        std::size_t inside = 0;
+        for (int z = 0; z < extent.z; ++z)
+            for (int y = 0; y < extent.y; ++y)
+                for (int x = 0; x < extent.x; ++x) {
+                    const auto expected = whole[index(g.extent, x + offset.x, y + offset.y, z + offset.z)];
+                    inside += expected;
+                    ASSERT_EQ(found[index(extent, x, y, z)], expected) << x << " " << y << " " << z;
+                }
+        EXPECT_GT(inside, 0u);
+    }
+}
+
+TEST(Winding, HolesOfMoreEdgesThanAskedForStayOpen) {
+    const vp::grid g = unit_grid(glm::ivec3(16));
+    const mesh m = below(sphere(glm::vec3(8.0f), 6.0f, 2), 9.0f);
+    vp::solid_options o = by_winding;
+    o.max_hole_edges = 3;
+    const solid s = library_solid(m, g, o);
+    EXPECT_EQ(s.status.solid.holes, 1u);
+    EXPECT_EQ(s.status.solid.cones, 0u);
+    EXPECT_EQ(s.voxels, library_solid(m, g).voxels) << "shadows of rows";
+}
+
+TEST(Winding, RulesAndVoxelSizesThatItDoesNotHaveAreRefused) {
+    vp::cpu_backend backend;
+    const mesh m = box({1, 1, 1}, {3, 3, 3});
+    const auto code = [&](const vp::grid& g, const vp::solid_options& o) {
+        vp::framebuffer<vp::cpu_backend, vp::target<vp::bit, vp::blend::bit_or>> fb{backend, g.extent};
+        return vp::voxelize_solid(backend, m.view(), g, vp::passthrough{}, vp::constant(true), fb, o).code;
+    };
+    vp::solid_options o = by_winding;
+    EXPECT_EQ(code(unit_grid(glm::ivec3(4)), o), vp::status_code::ok);
+    o.rule = vp::fill_rule::even_odd;
+    EXPECT_EQ(code(unit_grid(glm::ivec3(4)), o), vp::status_code::bad_solid_options);
+    o.rule = vp::fill_rule::positive;
+    EXPECT_EQ(code(unit_grid(glm::ivec3(4)), o), vp::status_code::ok);
+    EXPECT_EQ(code({{0, 0, 0}, {1e-40, 1.0, 1.0}, {4, 4, 4}}, o), vp::status_code::bad_voxel_size);
+}
+
+// ---- the tree, and bricks -------------------------------------------------------------------------------------------
+
+// An open mesh on a grid, its cones, and what the definition says of a sample.
+struct open_mesh {
+    vp::grid g;
+    std::vector<core::snapped_position> positions;
+    core::hole_cones cones;
+    core::winding_tree tree;
+
+    open_mesh(const mesh& m, const vp::grid& grid) : g(grid) {
+        std::vector<glm::uvec3> corners;
+        for (const auto& t : snap(m, g)) {
+            const auto first = static_cast<std::uint32_t>(positions.size());
+            for (const auto& v : t.v) positions.push_back({v[0], v[1], v[2]});
+            corners.push_back({first, first + 1, first + 2});
+        }
+        const auto n = static_cast<std::uint32_t>(corners.size());
+        cones =
+            core::close_holes({{positions.data(), positions.size(), {corners.data(), n, 3 * n}, n}}, ~std::uint64_t{0});
+        tree = core::winding_tree(cones, core::make_distance_scale(g.voxel_size, g.fraction()));
+    }
+    [[nodiscard]] core::snapped_position at(int x, int y, int z) const {
+        const auto centre = [&](int i) { return (2 * std::int64_t{i} + 1) << (g.fraction() - 1); };
+        return {centre(x), centre(y), centre(z)};
+    }
+    [[nodiscard]] core::winding_sample sample(const core::snapped_position& p) const {
+        core::winding_sample s{0, 0, false};
+        for (std::size_t i = 0; i < positions.size(); i += 3)
+            s.k += core::crossing_below(positions[i], positions[i + 1], positions[i + 2], p);
+        for (const glm::uvec3& t : cones.triangles) {
+            const core::snapped_position &a = cones.positions[t.x], &b = cones.positions[t.y],
+                                         &c = cones.positions[t.z];
+            s.k_cones += core::crossing_below(a, b, c, p);
+            s.is_on_cone = s.is_on_cone || core::is_on_triangle(a, b, c, p);
+        }
+        s.k += s.k_cones;
+        return s;
+    }
+    [[nodiscard]] bool is_inside(const core::snapped_position& p, std::int64_t k, vp::fill_rule rule) const {
+        const core::winding_view view = tree.view();
+        const int bits = core::angle_bits(view.num_triangles);
+        bool is_on = false;
+        const std::int64_t sum = core::sum_angles(view, p, bits, 0, view.num_triangles, is_on);
+        return is_on ? core::is_inside(rule, k) : core::is_inside_by_sum(rule, k, sum, bits);
+    }
+};
+mesh bitten_sphere(splitmix64& random, float middle, float radius) {
+    const mesh m = sphere(glm::vec3(middle), radius, 4);
+    mesh r{m.positions, {}};
+    for (const glm::uvec3& t : m.triangles) {
+        const glm::vec3 p = (m.positions[t.x] + m.positions[t.y] + m.positions[t.z]) / 3.0f - middle;
+        if (p.x + p.y + 0.5f * p.z < radius * static_cast<float>(random.uniform(0.7, 0.9))) r.triangles.push_back(t);
+    }
+    return r;
+}
+
+TEST(WindingTree, SamplesHaveTheVerdictsOfTheWholeSum) {
+    splitmix64 random(15);
+    const vp::grid g = unit_grid(glm::ivec3(24));
+    const open_mesh many(less_triangles(sphere(glm::vec3(12.0f), 9.0f, 4), random, 100), g),
+        one(bitten_sphere(random, 12.0f, 9.0f), g),
+        flat(less_faces(box({3.5f, 3.5f, 3.5f}, {11.5f, 12.5f, 10.5f}), {0}), unit_grid(glm::ivec3(16)));
+    for (const open_mesh* m : {&many, &one, &flat}) {
+        const core::winding_view view = m->tree.view();
+        std::size_t on_cones = 0;
+        for (int i = 0; i < 1500; ++i) {
+            const auto any = [&] { return static_cast<int>(random.between(0, m->g.extent.x - 1)); };
+            const core::snapped_position p = m->at(any(), any(), any());
+            core::winding_sample s = m->sample(p);
+            on_cones += s.is_on_cone ? 1 : 0;
+            s.k += random.between(-1, 1); // as if there were closed bodies around it
+            const vp::fill_rule rule = i % 2 == 0 ? vp::fill_rule::nonzero : vp::fill_rule::positive;
+            ASSERT_EQ(core::is_inside_by_winding(view, p, s, rule, i % 3 == 0), m->is_inside(p, s.k, rule)) << i;
+            const core::lid_angles lids = core::find_lid_angles(view, p, 0.0, 0x1p-10);
+            if (!lids.is_known || s.is_on_cone) continue;
+            bool is_on = false;
+            const int bits = core::angle_bits(view.num_triangles);
+            const double sum =
+                std::ldexp(static_cast<double>(core::sum_angles(view, p, bits, 0, view.num_triangles, is_on)), -bits);
+            ASSERT_NEAR(static_cast<double>(core::lids_below(view, p) - s.k_cones) - lids.turns + sum, 0.0, lids.error)
+                << "lids and cones close the same holes";
+        }
+        EXPECT_EQ(on_cones > 0, m == &flat);
+    }
+}
+
+TEST(WindingTree, BricksDecideTheirSamplesAsTheWholeSumDoes) {
+    splitmix64 random(16);
+    using verdict = core::winding_verdict;
+    std::size_t of_kind[6] = {};
+    const open_mesh flat(below(sphere(glm::vec3(32.0f), 28.0f, 4), 34.0f), unit_grid(glm::ivec3(64)));
+    const open_mesh bitten(bitten_sphere(random, 32.0f, 28.0f), unit_grid(glm::ivec3(64)));
+    for (const open_mesh* m : {&flat, &bitten}) {
+        const core::winding_view view = m->tree.view();
+        const core::triple<std::int64_t> extent{{64, 64, 64}};
+        std::vector<unsigned> marks(512);
+        const auto mark = [&](const core::snapped_position& a, const core::snapped_position& b,
+                              const core::snapped_position& c, unsigned bit) {
+            core::visit_bricks(a, b, c, extent, m->g.fraction(), 0, 1,
+                               [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+                                   marks[static_cast<std::size_t>((z * 8 + y) * 8 + x)] |= bit;
+                               });
+        };
+        for (std::size_t i = 0; i < m->positions.size(); i += 3)
+            mark(m->positions[i], m->positions[i + 1], m->positions[i + 2], core::meets_mesh);
+        for (const glm::uvec3& t : m->cones.triangles)
+            mark(m->cones.positions[t.x], m->cones.positions[t.y], m->cones.positions[t.z], core::meets_cones);
+        for (int i = 0; i < 512; ++i) {
+            const int x0 = i % 8 * 8, y0 = i / 8 % 8 * 8, z0 = i / 64 * 8;
+            // Some bricks are cut.
+            core::winding_samples samples{m->at(x0, y0, z0), {8, 8, 8}, std::int64_t{1} << m->g.fraction()};
+            if (i % 5 == 0) samples.count[i % 3] = 1 + static_cast<int>(random.below(7));
+            const auto known = [&](int x, int y, int z) { return m->sample(samples.at(x, y, z)); };
+            const core::winding_sample middle = known(samples.middle(0), samples.middle(1), samples.middle(2));
+            const vp::fill_rule rule = i % 2 == 0 ? vp::fill_rule::nonzero : vp::fill_rule::positive;
+            const verdict brick =
+                core::judge_brick(view, samples, middle.k, middle.k_cones, marks[static_cast<std::size_t>(i)], rule);
+            ++of_kind[brick.kind];
+            const bool is_rare = brick.kind != verdict::outside && brick.kind != verdict::inside &&
+                                 !(brick.kind == verdict::beyond && brick.whole == 0);
+            for (int n = 0; n < (is_rare ? 12 : 2); ++n) {
+                int q[3];
+                for (int k = 0; k < 3; ++k)
+                    q[k] = static_cast<int>(random.below(static_cast<std::uint64_t>(samples.count[k])));
+                const core::winding_sample s = known(q[0], q[1], q[2]);
+                ASSERT_EQ(core::judge_sample(view, samples, brick, q[0], q[1], q[2], s, rule),
+                          m->is_inside(samples.at(q[0], q[1], q[2]), s.k, rule))
+                    << i << " kind " << brick.kind;
+            }
+        }
+    }
+    for (const auto kind : {verdict::outside, verdict::inside, verdict::beyond, verdict::number, verdict::unknown})
+        EXPECT_GT(of_kind[kind], 0u) << kind;
+    EXPECT_LT(of_kind[verdict::unknown], 512u) << "of 1024";
+}
+
+TEST(WindingTree, MarksOfBricksMissNoTriangleAndSamplesOnTrianglesAreAllFound) {
+    splitmix64 random(17);
+    constexpr int fraction = 3, n = 20; // three bricks along each axis, the last one cut
+    const core::triple<std::int64_t> extent{{n, n, n}};
+    std::size_t on = 0, met = 0, marked = 0;
+    for (int i = 0; i < 300; ++i) {
+        core::snapped_position v[3];
+        // Many planes through samples; every third triangle reaches far beyond the grid.
+        const auto any = [&] { return 4 * random.between(i % 3 == 0 ? -200 : -3, i % 3 == 0 ? 240 : 43); };
+        for (auto& p : v) p = {any(), any(), any()};
+        if (i % 4 == 0) v[1].z = v[2].z = v[0].z;
+        if (i % 7 == 0) v[2] = v[1]; // no area
+        std::vector<std::uint8_t> found(n * n * n), bricks(27);
+        for (int lane = 0; lane < 4; ++lane) {
+            core::visit_samples_on(v[0], v[1], v[2], extent, fraction, lane, 4,
+                                   [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+                                       found[static_cast<std::size_t>((z * n + y) * n + x)] = 1;
+                                   });
+            core::visit_bricks(v[0], v[1], v[2], extent, fraction, lane, 4,
+                               [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+                                   bricks[static_cast<std::size_t>((z * 3 + y) * 3 + x)] = 1;
+                               });
+        }
+        for (int s = 0; s < n * n * n; ++s) {
+            const int x = s % n, y = s / n % n, z = s / n / n;
+            const core::snapped_position p{8 * x + 4, 8 * y + 4, 8 * z + 4};
+            const bool is_on = core::is_on_triangle(v[0], v[1], v[2], p);
+            ASSERT_EQ(found[static_cast<std::size_t>(s)], is_on ? 1 : 0);
+            on += is_on ? 1 : 0;
+            ASSERT_TRUE(!is_on || bricks[static_cast<std::size_t>((z / 8 * 3 + y / 8) * 3 + x / 8)] == 1);
+        }
+        // Points of the triangle, within the box of a brick's samples.
+        if (i % 7 == 0) continue;
+        for (int s = 0; s < 200; ++s) {
+            double a = random.uniform(0.0, 1.0), b = random.uniform(0.0, 1.0);
+            if (a + b > 1.0) {
+                a = 1.0 - a;
+                b = 1.0 - b;
+            }
+            int brick = 0;
+            bool is_met = true;
+            for (int k = 2; k >= 0; --k) {
+                const auto c = [&](int j) { return static_cast<double>(k == 0 ? v[j].x : k == 1 ? v[j].y : v[j].z); };
+                const double at = c(0) + a * (c(1) - c(0)) + b * (c(2) - c(0)), first = std::floor(at / 64.0);
+                is_met =
+                    is_met && first >= 0.0 && first <= 2.0 && at - 64.0 * first >= 4.0 && at - 64.0 * first <= 60.0;
+                brick = 3 * brick + static_cast<int>(std::clamp(first, 0.0, 2.0));
+            }
+            if (!is_met) continue;
+            ++met;
+            ASSERT_EQ(bricks[static_cast<std::size_t>(brick)], 1) << i;
+        }
+        for (const std::uint8_t b : bricks) marked += b;
+    }
+    EXPECT_GT(on, 1000u);
+    EXPECT_GT(met, 5000u);
+    EXPECT_LT(marked, 300u * 27u / 2u);
+}
+
+} // namespace
+} // namespace solids

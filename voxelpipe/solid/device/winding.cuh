@@ -1,0 +1,233 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// repair::winding: the winding number of every voxel, of the mesh with its cones, and what the cones' solid angles make
+// of it, brick by brick (solid/core/winding_bricks.hpp).
+
+#include <voxelpipe/solid/core/winding_bricks.hpp>
+#include <voxelpipe/solid/device/bit_sweeps.cuh>
+#include <voxelpipe/solid/device/emit_crossings.cuh>
+#include <voxelpipe/solid/device/sweep_rows.cuh>
+
+#include <cstdint>
+
+namespace voxelpipe::device {
+
+using core::winding_brick;
+
+// Winding numbers of all bodies, a place a voxel and one behind each row; and bits and marks of one body.
+struct winding_memory {
+    std::int32_t* windings = nullptr;
+    std::int32_t* of_cones = nullptr;
+    word* inside = nullptr;
+    word* on_cones = nullptr;       // voxels whose samples lie on a cone
+    std::uint32_t* marks = nullptr; // core::winding_mark, of each brick
+
+    [[nodiscard]] static std::uint64_t of_body(const row_grid& grid) {
+        return grid.num_rows() * (static_cast<std::uint64_t>(grid.extent.x) + 1);
+    }
+    [[nodiscard]] static std::uint64_t num_bricks(const row_grid& grid) {
+        const auto n = core::bricks_of({{grid.extent.x, grid.extent.y, grid.extent.z}});
+        return static_cast<std::uint64_t>(n[0] * n[1] * n[2]);
+    }
+    [[nodiscard]] static winding_memory take(arena& memory, const row_grid& grid, std::uint32_t bodies) {
+        winding_memory m;
+        m.windings = memory.take<std::int32_t>(of_body(grid) * bodies);
+        m.of_cones = memory.take<std::int32_t>(of_body(grid) * bodies);
+        m.inside = memory.take<word>(bit_box{grid.extent}.num_words());
+        m.on_cones = memory.take<word>(bit_box{grid.extent}.num_words());
+        m.marks = memory.take<std::uint32_t>(num_bricks(grid));
+        return m;
+    }
+    void clear(const row_grid& grid, std::uint32_t bodies, cudaStream_t stream) const {
+        const std::size_t bytes = of_body(grid) * bodies * sizeof(std::int32_t);
+        check(cudaMemsetAsync(windings, 0, bytes, stream), stage::fine_raster);
+        check(cudaMemsetAsync(of_cones, 0, bytes, stream), stage::fine_raster);
+    }
+    void clear_body(const row_grid& grid, cudaStream_t stream) const {
+        check(cudaMemsetAsync(on_cones, 0, bit_box{grid.extent}.num_words() * sizeof(word), stream),
+              stage::fine_raster);
+        check(cudaMemsetAsync(marks, 0, num_bricks(grid) * sizeof(std::uint32_t), stream), stage::fine_raster);
+    }
+};
+
+// Primitives of a body: those of its draws, and of its cones.
+struct winding_triangles {
+    std::uint32_t first, last, first_cone, last_cone;
+};
+
+// Marks the bricks that triangles of a body meet, and samples on its cones. A warp a triangle.
+template <class State>
+__global__ __launch_bounds__(threads_per_block) void mark_bricks_kernel(const __grid_constant__ geometry geo,
+                                                                        const __grid_constant__ row_grid grid,
+                                                                        winding_triangles of_body, word* on_cones,
+                                                                        std::uint32_t* marks, const State* state) {
+    if (state->index_error != 0) return;
+    const core::triple<std::int64_t> extent{{grid.extent.x, grid.extent.y, grid.extent.z}};
+    const core::triple<std::int64_t> bricks = core::bricks_of(extent);
+    const bit_box box{grid.extent};
+    const std::int64_t lane = threadIdx.x % 32;
+    const std::uint32_t drawn = of_body.last - of_body.first, all = drawn + of_body.last_cone - of_body.first_cone;
+    for (std::uint64_t i = std::uint64_t{blockIdx.x} * (threads_per_block / 32) + warp_in_block(); i < all;
+         i += std::uint64_t{gridDim.x} * (threads_per_block / 32)) {
+        const bool is_cone = i >= drawn;
+        const auto n = static_cast<std::uint32_t>(i);
+        const loaded_triangle t = geo.load(is_cone ? of_body.first_cone + n - drawn : of_body.first + n);
+        if (!t.index_ok || core::classify_positions(t.a, t.b, t.c) != core::triangle_class::drawn) continue;
+        const auto mark = [&](std::int64_t x, std::int64_t y, std::int64_t z, std::uint32_t bit) {
+            std::uint32_t* const at = marks + (z * bricks[1] + y) * bricks[0] + x;
+            if ((*at & bit) == 0) atomicOr(at, bit);
+        };
+        core::visit_bricks(t.a, t.b, t.c, extent, grid.fraction, lane, 32,
+                           [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+                               mark(x, y, z, is_cone ? core::meets_cones : core::meets_mesh);
+                           });
+        if (is_cone)
+            core::visit_samples_on(
+                t.a, t.b, t.c, extent, grid.fraction, lane, 32, [&](std::int64_t x, std::int64_t y, std::int64_t z) {
+                    atomicOr(on_cones + box.first_word(static_cast<int>(y), static_cast<int>(z)) + x / 32,
+                             word{1} << x % 32);
+                    mark(x / winding_brick, y / winding_brick, z / winding_brick, core::has_samples_on_cones);
+                });
+    }
+}
+
+// Steps at crossings become winding numbers, and bits of those that the rule calls inside. A warp a row. of_cones: or
+// null.
+template <class State>
+__global__ __launch_bounds__(threads_per_block) void sum_windings_kernel(std::int32_t* windings, std::int32_t* of_cones,
+                                                                         const __grid_constant__ row_grid grid,
+                                                                         fill_rule rule, word* inside, State* state) {
+    const unsigned lane = threadIdx.x % 32;
+    const auto nx = static_cast<std::uint32_t>(grid.extent.x);
+    const bit_box box{grid.extent};
+    unsigned long long open = 0;
+    std::uint32_t most = 0;
+    for (std::uint64_t row = std::uint64_t{blockIdx.x} * (threads_per_block / 32) + warp_in_block();
+         row < grid.num_rows(); row += std::uint64_t{gridDim.x} * (threads_per_block / 32)) {
+        std::int32_t* const of_row = windings + row * (std::uint64_t{nx} + 1);
+        std::int32_t before = 0;
+        for (std::uint32_t x0 = 0; x0 < nx; x0 += 32) {
+            const std::uint32_t x = x0 + lane;
+            const std::int32_t winding = before + sum_up_to_lane(x < nx ? of_row[x] : 0);
+            before = __shfl_sync(0xffffffffu, winding, 31);
+            if (x < nx) {
+                of_row[x] = winding;
+                const auto size = static_cast<std::uint32_t>(winding < 0 ? -winding : winding);
+                most = size > most ? size : most;
+            }
+            const word bits =
+                __ballot_sync(0xffffffffu, static_cast<int>(x < nx && core::is_inside(rule, std::int64_t{winding})));
+            if (lane == 0) inside[row * box.words_x() + x0 / 32] = bits;
+        }
+        if (lane == 0 && before + of_row[nx] != 0) ++open;
+        if (of_cones == nullptr) continue;
+        std::int32_t* const cones = of_cones + row * (std::uint64_t{nx} + 1);
+        before = 0;
+        for (std::uint32_t x0 = 0; x0 < nx; x0 += 32) {
+            const std::uint32_t x = x0 + lane;
+            const std::int32_t winding = before + sum_up_to_lane(x < nx ? cones[x] : 0);
+            before = __shfl_sync(0xffffffffu, winding, 31);
+            if (x < nx) cones[x] = winding;
+        }
+    }
+    const unsigned long long sum = block_sum(open);
+    if (threadIdx.x == 0 && sum != 0) atomicAdd(&state->solid.open_rows, sum);
+    most = __reduce_max_sync(0xffffffffu, most);
+    if (lane == 0 && most != 0) atomicMax(&state->solid.max_winding, static_cast<unsigned long long>(most));
+}
+
+// Decides the samples of bricks by their generalized winding numbers, where these may differ from the others'. A warp
+// takes a brick, whose rows are bytes of the bits.
+template <class State>
+__global__ __launch_bounds__(threads_per_block) void decide_bricks_kernel(
+    const std::int32_t* windings, const std::int32_t* of_cones, const word* on_cones, const std::uint32_t* marks,
+    const __grid_constant__ row_grid grid, const __grid_constant__ core::winding_view tree, fill_rule rule,
+    std::uint8_t* inside, const State* state) {
+    if (state->index_error != 0) return;
+    const int lane = static_cast<int>(threadIdx.x % 32);
+    const auto bricks_of = [](int n) { return static_cast<std::uint64_t>(n + winding_brick - 1) / winding_brick; };
+    const std::uint64_t bx = bricks_of(grid.extent.x), by = bricks_of(grid.extent.y), bz = bricks_of(grid.extent.z);
+    const bit_box box{grid.extent};
+    const auto at = [&](int i) { return (2 * std::int64_t{i} + 1) << (grid.fraction - 1); };
+    const auto place = [&](int x, int y, int z) {
+        return grid.row(y, z) * (static_cast<std::uint64_t>(grid.extent.x) + 1) + static_cast<std::uint64_t>(x);
+    };
+    const auto cut = [](int first, int extent) {
+        return extent - first < winding_brick ? extent - first : winding_brick;
+    };
+    for (std::uint64_t brick = std::uint64_t{blockIdx.x} * (threads_per_block / 32) + warp_in_block();
+         brick < bx * by * bz; brick += std::uint64_t{gridDim.x} * (threads_per_block / 32)) {
+        const int x0 = static_cast<int>(brick % bx) * winding_brick,
+                  y0 = static_cast<int>(brick / bx % by) * winding_brick,
+                  z0 = static_cast<int>(brick / (bx * by)) * winding_brick;
+        const core::winding_samples samples{{at(x0), at(y0), at(z0)},
+                                            {cut(x0, grid.extent.x), cut(y0, grid.extent.y), cut(z0, grid.extent.z)},
+                                            std::int64_t{1} << grid.fraction};
+        const std::uint64_t middle = place(x0 + samples.middle(0), y0 + samples.middle(1), z0 + samples.middle(2));
+        const std::uint32_t mark = marks[brick];
+        // For all lanes alike.
+        const core::winding_verdict known =
+            core::judge_brick(tree, samples, windings[middle], of_cones[middle], mark, rule);
+        if (known.kind == core::winding_verdict::beyond && known.whole == 0) continue; // as the bits are
+        for (int step = 0; step < 2 * winding_brick; ++step) {
+            const int x = lane % 8, y = lane / 8 + 4 * (step % 2), z = step / 2;
+            const bool exists = x < samples.count[0] && y < samples.count[1] && z < samples.count[2];
+            bool is_in = false;
+            if (exists) {
+                const std::uint64_t i = place(x0 + x, y0 + y, z0 + z);
+                const bool is_on =
+                    (mark & core::has_samples_on_cones) != 0 &&
+                    (on_cones[box.first_word(y0 + y, z0 + z) + static_cast<std::uint64_t>(x0 / 32)] >> (x0 % 32 + x) &
+                     1) != 0;
+                is_in = core::judge_sample(tree, samples, known, x, y, z, {windings[i], of_cones[i], is_on}, rule);
+            }
+            const word bits = __ballot_sync(0xffffffffu, static_cast<int>(is_in));
+            if (exists && lane % 8 == 0)
+                inside[box.first_word(y0 + y, z0 + z) * sizeof(word) + static_cast<std::uint64_t>(x0 / 8)] =
+                    static_cast<std::uint8_t>(bits >> (lane / 8 * 8));
+        }
+    }
+}
+
+// What an extent makes of the inside and of the cover in `mask`.
+template <class State>
+__global__ void join_cover_kernel(const word* inside, std::uint64_t num_words, solid_extent extent, word* mask,
+                                  State*) {
+    for_each_number(num_words, [&](std::uint64_t i) {
+        mask[i] = extent == solid_extent::centre  ? inside[i]
+                  : extent == solid_extent::outer ? inside[i] | mask[i]
+                                                  : inside[i] & ~mask[i];
+    });
+}
+
+// Makes the mask of a body from the crossings of all bodies and, unless the extent is `centre`, from its cover.
+template <int = 0>
+void add_windings(const winding_memory& m, const core::winding_view& tree, const geometry& geo,
+                  const winding_triangles& triangles, const row_grid& grid, fill_rule rule, solid_extent extent,
+                  std::uint32_t body, word* mask, pipeline_state* state, cudaStream_t stream) {
+    const std::uint64_t first = body * winding_memory::of_body(grid);
+    const bit_box box{grid.extent};
+    const unsigned blocks = fill_device(grid.num_rows() * 32, 16);
+    sum_windings_kernel<pipeline_state><<<blocks, threads_per_block, 0, stream>>>(
+        m.windings + first, tree.num_triangles != 0 ? m.of_cones + first : nullptr, grid, rule, m.inside, state);
+    check(cudaGetLastError(), stage::fine_raster);
+    if (tree.num_triangles != 0) {
+        m.clear_body(grid, stream);
+        const std::uint64_t all =
+            std::uint64_t{triangles.last} - triangles.first + triangles.last_cone - triangles.first_cone;
+        mark_bricks_kernel<pipeline_state><<<fill_device(all * 32, 16), threads_per_block, 0, stream>>>(
+            geo, grid, triangles, m.on_cones, m.marks, state);
+        check(cudaGetLastError(), stage::fine_raster);
+        decide_bricks_kernel<pipeline_state><<<blocks, threads_per_block, 0, stream>>>(
+            m.windings + first, m.of_cones + first, m.on_cones, m.marks, grid, tree, rule,
+            reinterpret_cast<std::uint8_t*>(m.inside), state);
+        check(cudaGetLastError(), stage::fine_raster);
+    }
+    join_cover_kernel<pipeline_state><<<fill_device(box.num_words(), 16), threads_per_block, 0, stream>>>(
+        m.inside, box.num_words(), extent, mask, state);
+    check(cudaGetLastError(), stage::fine_raster);
+}
+
+} // namespace voxelpipe::device
