@@ -405,7 +405,7 @@ struct open_mesh {
     core::hole_cones cones;
     core::winding_tree tree;
 
-    open_mesh(const mesh& m, const vp::grid& grid) : g(grid) {
+    open_mesh(const mesh& m, const vp::grid& grid, std::uint64_t max_hole_edges = ~std::uint64_t{0}) : g(grid) {
         std::vector<glm::uvec3> corners;
         for (const auto& t : snap(m, g)) {
             const auto first = static_cast<std::uint32_t>(positions.size());
@@ -414,7 +414,7 @@ struct open_mesh {
         }
         const auto n = static_cast<std::uint32_t>(corners.size());
         cones =
-            core::close_holes({{positions.data(), positions.size(), {corners.data(), n, 3 * n}, n}}, ~std::uint64_t{0});
+            core::close_holes({{positions.data(), positions.size(), {corners.data(), n, 3 * n}, n}}, max_hole_edges);
         tree = core::winding_tree(cones, core::make_distance_scale(g.voxel_size, g.fraction()));
     }
     [[nodiscard]] core::snapped_position at(int x, int y, int z) const {
@@ -479,6 +479,31 @@ TEST(WindingTree, SamplesHaveTheVerdictsOfTheWholeSum) {
                 << "lids and cones close the same holes";
         }
         EXPECT_EQ(on_cones > 0, m == &flat);
+    }
+}
+
+// The shadow of a hole that is left open begins and ends where no triangle is.
+TEST(WindingTree, ShadowsOfHolesThatStayOpenAreThoseOfRows) {
+    splitmix64 random(18);
+    const vp::grid g = unit_grid(glm::ivec3(33, 28, 28));
+    const mesh m = less_triangles(bitten_sphere(random, 14.0f, 11.0f).inside_out(), random, 40);
+    vp::solid_options o = by_winding;
+    for (const std::uint64_t most : {3u, 12u}) {
+        o.max_hole_edges = most;
+        const open_mesh expected(m, g, most);
+        ASSERT_GT(expected.cones.cones, 5u);
+        ASSERT_LT(expected.cones.cones, expected.cones.holes);
+        const voxel_set found = library_solid(m, g, o).voxels;
+        std::size_t shadows = 0;
+        for (int i = 0; i < 6000; ++i) {
+            const int x = static_cast<int>(random.below(33)), y = static_cast<int>(random.below(28)),
+                      z = static_cast<int>(random.below(28));
+            const core::snapped_position p = expected.at(x, y, z);
+            const bool is_in = expected.is_inside(p, expected.sample(p).k, vp::fill_rule::nonzero);
+            ASSERT_EQ(found[index(g.extent, x, y, z)], is_in ? 1 : 0) << x << " " << y << " " << z;
+            shadows += is_in && x > 26 ? 1 : 0;
+        }
+        EXPECT_GT(shadows, 0u);
     }
 }
 

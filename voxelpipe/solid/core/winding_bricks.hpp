@@ -225,7 +225,8 @@ struct winding_verdict {
         r.kind = winding_verdict::beyond; // by nothing
         return r;
     }
-    const bool has_mesh = (marks & meets_mesh) != 0, has_cones = (marks & meets_cones) != 0;
+    // In the shadow of a hole that is left open k may change anywhere.
+    const bool has_mesh = (marks & meets_mesh) != 0 || t.has_all == 0, has_cones = (marks & meets_cones) != 0;
     if (has_mesh && has_cones) return r;
     const lid_angles lids = find_lid_angles(t, p, reach, 0x1p-8);
     if (!lids.is_known || lids.slope < 0.0) return r;

@@ -21,7 +21,8 @@ class winding_tree {
 public:
     winding_tree() = default;
     // scale: of the grid in whose units the cones' positions are. Throws std::bad_alloc.
-    winding_tree(const hole_cones& cones, const distance_scale& scale) : scale_(scale) {
+    winding_tree(const hole_cones& cones, const distance_scale& scale)
+        : scale_(scale), has_all_(cones.cones == cones.holes ? 1 : 0) {
         corners_.reserve(3 * cones.triangles.size());
         for (const glm::uvec3& t : cones.triangles)
             corners_.insert(corners_.end(), {cones.positions[t.x], cones.positions[t.y], cones.positions[t.z]});
@@ -49,6 +50,7 @@ public:
                 static_cast<std::uint32_t>(holes_.size()),
                 corners,
                 static_cast<std::uint32_t>(corners_.size() / 3),
+                has_all_,
                 scale_};
     }
     // Refers to the object.
@@ -273,6 +275,7 @@ private:
     }
 
     distance_scale scale_{};
+    std::uint32_t has_all_ = 1;
     std::vector<winding_node> nodes_, holes_;
     std::vector<snapped_position> lids_, corners_;
 };

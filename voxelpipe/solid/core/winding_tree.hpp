@@ -39,6 +39,7 @@ struct winding_view {
     std::uint32_t num_holes = 0;
     const snapped_position* corners = nullptr; // of the cones' triangles, three each
     std::uint32_t num_triangles = 0;
+    std::uint32_t has_all = 1; // no hole is left open, which would cast shadows along rows
     distance_scale scale{};
 };
 
