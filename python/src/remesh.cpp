@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-#include "arrays.hpp"
+#include "bricks.hpp"
 #include "report.hpp"
 
 #include <bindings/parts.hpp>
-#include <voxelpipe/surfaces/remesh.hpp>
+#include <voxelpipe/surfaces/remesh_sparse.hpp>
 
 #include <nanobind/stl/optional.h>
 
@@ -165,6 +165,14 @@ struct column_surface<std::index_sequence<F...>, std::index_sequence<I...>> {
     }
 };
 
+// Samples lie in bricks, which take no longer and less memory; those of a level in a grid, whose band may be wide.
+template <class Draws, class Surface>
+status remesh_by_level(cpu_backend& backend, const Draws& draws, const grid& g, Surface& made,
+                       const remesh_options& options) {
+    return options.level == 0 ? remesh_sparse(backend, draws, g, made, options)
+                              : remesh(backend, draws, g, made, options);
+}
+
 // As voxelpipe/_remesh.py has them: at most 16 columns of floats and 4 of integers. The arrays of the surface, then
 // (n, columns) of floats and of integers. Throws ValueError.
 nb::tuple remesh_parts(const position_array& positions, const triangle_array& triangles,
@@ -200,7 +208,7 @@ nb::tuple remesh_parts(const position_array& positions, const triangle_array& tr
             const nb::gil_scoped_release released;
             const auto draws = draws_of_parts<draw<mesh_view<>, passthrough, shader>>(
                 mesh, first_triangles, shader{mesh.triangles.data(), floats, integers});
-            s = remesh(backend, draws, g, made, options);
+            s = remesh_by_level(backend, draws, g, made, options);
         }
         const nb::tuple arrays = arrays_of(backend, made, world, s);
         const auto [rows, whole] = columns::arrays(backend, made, floats.count(), integers.count());
@@ -211,7 +219,7 @@ nb::tuple remesh_parts(const position_array& positions, const triangle_array& tr
                                            [&](cpu_backend& backend, surface<cpu_backend>& made) {
                                                const auto draws = draws_of_parts<draw<mesh_view<>, passthrough, none>>(
                                                    mesh, first_triangles, none{});
-                                               return remesh(backend, draws, g, made, options);
+                                               return remesh_by_level(backend, draws, g, made, options);
                                            }),
                               nb::none(), nb::none());
     if (integers.count() == 0 && floats.count() <= 4) return run.template operator()<1, 0>();
@@ -253,6 +261,69 @@ nb::tuple extract_field(const array<const float, 3>& values, const grid& g, cons
     });
 }
 
+// Cubes of voxels (m, 4): the first voxel and the side, as tiles() has them.
+using cube_array = nb::ndarray<const std::int32_t, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu>;
+
+// In ascending order. Throws IndexError for a cube that leaves the grid, and ValueError for one that is none of bricks,
+// or has voxels of another one or of the list.
+std::vector<brick_tile> tiles_of(const cube_array& cubes, const grid& g, const listed_bricks& listed) {
+    std::vector<brick_tile> tiles;
+    for (std::size_t i = 0; i < cubes.shape(0); ++i) {
+        const std::int32_t* const c = cubes.data() + 4 * i;
+        const std::int64_t side = c[3];
+        int level = 0;
+        while (std::int64_t{8} << level < side) ++level;
+        bool is_aligned = std::int64_t{8} << level == side, is_within = true;
+        for (int a = 0; a < 3; ++a) {
+            is_aligned = is_aligned && (c[a] + std::int64_t{g.offset[a]}) % side == 0;
+            is_within = is_within && c[a] >= 0 && c[a] + side <= g.extent[a];
+        }
+        const std::string name =
+            "cube " + std::to_string(i) + " of side " + std::to_string(side) + " at " + voxel_text(c);
+        if (!is_aligned)
+            throw std::invalid_argument(name + " is none of 8, 16, 32 ... voxels that begins at a multiple");
+        if (!is_within) throw std::out_of_range(name + " leaves the grid");
+        const glm::ivec3 first(c[0] + g.offset.x, c[1] + g.offset.y, c[2] + g.offset.z);
+        tiles.push_back(brick_tile::of(core::morton_key(first) >> 9, level));
+    }
+    std::sort(tiles.begin(), tiles.end(), [](const brick_tile& a, const brick_tile& b) { return a.bits < b.bits; });
+    for (std::size_t i = 0; i < tiles.size(); ++i) {
+        const auto next = std::lower_bound(listed.keys.begin(), listed.keys.end(), tiles[i].first());
+        const bool has_listed = next != listed.keys.end() && *next < tiles[i].end();
+        if (has_listed || (i + 1 < tiles.size() && tiles[i].end() > tiles[i + 1].first()))
+            throw std::invalid_argument("two cubes, or a cube and a voxel of the list, are in one place");
+    }
+    return tiles;
+}
+
+// What is listed is inside.
+nb::tuple extract_list(const voxel_array& voxels, const cube_array& cubes, const grid& g, const std::string& place_name,
+                       bool open, bool quads, std::uint32_t min_component, bool embedded, unsigned threads) {
+    const extract_options options = extract_options_named(place_name, 0.0, open, quads, min_component, embedded);
+    return made_surface(g, threads, [&](cpu_backend& backend, surface<cpu_backend>& made) {
+        using bits = target<bit, blend::replace>;
+        sparse_framebuffer<cpu_backend, bits> inside(backend, g.extent);
+        {
+            const listed_bricks listed = bricks_of(voxels, g, g.offset);
+            const std::vector<brick_tile> tiles = tiles_of(cubes, g, listed);
+            sparse_contents<cpu_backend, bits> contents(backend);
+            const auto hold = [&]<class T>(const std::vector<T>& from) {
+                return cpu_backend::buffer<T>(backend, array_view<const T>(from));
+            };
+            contents.keys = hold(listed.keys);
+            contents.masks = hold(listed.masks);
+            contents.offsets = hold(listed.offsets);
+            contents.tiles = hold(tiles);
+            contents.num_voxels = voxels.shape(0);
+            for (const brick_tile& t : tiles) contents.tile_voxels += t.num_voxels();
+            get<0>(contents.values) = hold(
+                std::vector<std::uint32_t>(core::rank_map<bits>::elements(contents.num_values()), ~std::uint32_t{0}));
+            inside.take(std::move(contents), g);
+        }
+        return extract(backend, inside, g, made, options);
+    });
+}
+
 } // namespace
 
 void bind_remesh(nb::module_& m) {
@@ -263,6 +334,8 @@ void bind_remesh(nb::module_& m) {
           nb::arg("vertex_integers"), nb::arg("triangle_integers"), nb::arg("threads"));
     m.def("extract_bits", &extract_bits, nb::arg("values"), nb::arg("grid"), nb::arg("place"), nb::arg("open"),
           nb::arg("quads"), nb::arg("min_component"), nb::arg("embedded"), nb::arg("threads"));
+    m.def("extract_list", &extract_list, nb::arg("voxels"), nb::arg("cubes"), nb::arg("grid"), nb::arg("place"),
+          nb::arg("open"), nb::arg("quads"), nb::arg("min_component"), nb::arg("embedded"), nb::arg("threads"));
     m.def("extract_field", &extract_field, nb::arg("values"), nb::arg("grid"), nb::arg("place"), nb::arg("level"),
           nb::arg("open"), nb::arg("quads"), nb::arg("min_component"), nb::arg("embedded"), nb::arg("threads"));
 }

@@ -5,7 +5,7 @@
 #include "grid_state.hpp"
 #include "sparse.hpp"
 
-#include "draw/sparse/sparse_pipeline.hpp"
+#include "draw/sparse/sparse_parts.hpp"
 #include "model/placement.hpp"
 
 #include <nanobind/stl/optional.h>

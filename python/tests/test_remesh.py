@@ -58,6 +58,60 @@ def test_random_voxels_and_fields_are_closed():
     assert counts["nan_samples"] == 1
 
 
+def same(a, b):
+    for x, y in zip(a[:2], b[:2]):
+        np.testing.assert_array_equal(x, y)
+    for name in ("cell", "sheet", "source"):
+        np.testing.assert_array_equal(a[2][name], b[2][name])
+
+
+def test_lists_are_the_dense_surface():
+    trimesh = pytest.importorskip("trimesh")
+    rng = np.random.default_rng(4)
+    grid = vp.Grid((0, 0, 0), (0.5,) * 3, (50, 45, 40)).crop((3, 2, 9), (30, 33, 21))
+    inside = rng.random(grid.shape) < 0.2
+    voxels = np.argwhere(inside)[:, ::-1]
+    rng.shuffle(voxels)
+    same(vp.extract(voxels, grid, quads=True, min_component=9), vp.extract(inside, grid, quads=True, min_component=9))
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=21)
+    grid = vp.fit(ball, 47)
+    inside = vp.solid(ball, grid, extent="centre")
+    counts = {}
+    voxels, cubes = vp.tiles(ball, grid, extent="centre")
+    assert len(cubes) > 10
+    made = vp.extract((voxels, cubes), grid, status=counts)
+    same(made, vp.extract(inside, grid))
+    judge(*made[:2])
+    assert counts["components"] == 1
+    same(vp.extract(vp.sparse(ball, grid, solid="nonzero", extent="centre"), grid), made)
+    # A grid whose bits are 2^50.
+    grid = vp.Grid((-20, -20, -20), (1, 1, 1), (2**17,) * 3)
+    judge(*vp.remesh(ball, grid)[:2])
+    judge(*vp.extract(vp.tiles(ball, grid), grid)[:2])
+
+
+def test_lists_that_are_none():
+    grid = vp.Grid((0, 0, 0), (1, 1, 1), (20, 20, 20))
+    none = np.empty((0, 3), np.int32)
+    assert len(vp.extract(none, grid)[0]) == 0
+    with pytest.raises(IndexError, match="outside"):
+        vp.extract(np.array([[1, 20, 3]]), grid)
+    with pytest.raises(ValueError, match="same"):
+        vp.extract(np.array([[1, 2, 3], [1, 2, 3]]), grid)
+    with pytest.raises(ValueError, match="level"):
+        vp.extract(none, grid, level=1)
+    with pytest.raises(ValueError, match="multiple"):
+        vp.extract((none, np.array([[4, 8, 8, 8]])), grid)
+    with pytest.raises(ValueError, match="multiple"):
+        vp.extract((none, np.array([[0, 0, 0, 9]])), grid)
+    with pytest.raises(IndexError, match="leaves"):
+        vp.extract((none, np.array([[16, 8, 8, 8]])), grid)
+    with pytest.raises(ValueError, match="in one place"):
+        vp.extract((np.array([[8, 9, 10]]), np.array([[8, 8, 8, 8]])), grid)
+    with pytest.raises(ValueError, match="in one place"):
+        vp.extract((none, np.array([[0, 0, 0, 16], [8, 8, 8, 8]])), grid)
+
+
 def test_corners_of_one_voxel():
     grid = vp.Grid((1, 2, 3), (0.5,) * 3, (3, 3, 3))
     inside = np.zeros(grid.shape, bool)

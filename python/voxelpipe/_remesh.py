@@ -7,6 +7,8 @@ from typing import Any, Mapping
 import numpy as np
 
 from . import _core
+from ._arrays import to_numpy
+from ._axes import as_voxels
 from ._bake import _attributes, _Attribute
 from ._core import Grid
 from ._distance import _host_mesh, _warn_of_holes
@@ -182,7 +184,8 @@ def extract(
 
     Args:
         values: bool (nz, ny, nx): the voxels that are inside. Or floats, such as those of distance(): what is below
-            `level` is inside; NaN is outside.
+            `level` is inside; NaN is outside. Or lists of what is inside, whose memory is that of the surface: voxels (n, 3),
+            as a VoxelList, the result of sparse() or that of tiles().
         grid: the grid of the values; a value lies at the centre of its voxel.
         place: where vertices lie in their cells: "mean" at the mean of the cell's crossings, "corner" at the corners of
             voxels. "sharp" has no planes here, and is "mean".
@@ -191,7 +194,8 @@ def extract(
         quads, min_component, embedded, threads, status: as in remesh().
 
     Returns vertices, faces and a dict as remesh() does, with a `source` of -1. Raises ValueError for values of another
-    shape than the grid, TypeError for values that are neither bool nor floats.
+    shape than the grid and for a voxel that is listed twice, IndexError for one outside of the grid, TypeError for values
+    that are neither bool, floats nor lists.
 
     Example:
         >>> vertices, faces, more = vp.extract(vp.solid(mesh, grid), grid, place="corner")
@@ -200,8 +204,18 @@ def extract(
     check_choice("place", place, Place)
     check_choice("border", border, Border)
     _check_numbers(level, min_component)
-    array = np.asarray(values)
-    if array.dtype == np.bool_:
+    is_pair = isinstance(values, tuple) and len(values) == 2
+    array = np.asarray(values[0] if is_pair else values)
+    if is_pair or (array.ndim == 2 and np.issubdtype(array.dtype, np.integer)):
+        if level != 0:
+            raise ValueError("lists of voxels have no level")
+        cubes = np.empty((0, 4), np.int32)
+        if is_pair and not isinstance(values[1], Mapping):
+            cubes = np.ascontiguousarray(to_numpy(values[1], "cubes"), np.int32).reshape(-1, 4)
+        made = _core.extract_list(
+            as_voxels(array), cubes, grid, place, border == "open", quads, min_component, bool(embedded), threads
+        )
+    elif array.dtype == np.bool_:
         if level != 0:
             raise ValueError("bool values have no level")
         inside = np.ascontiguousarray(array).view(np.uint8)
@@ -212,7 +226,7 @@ def extract(
             field, grid, place, float(level), border == "open", quads, min_component, bool(embedded), threads
         )
     else:
-        raise TypeError(f"values are bool, which voxels are inside, or floats, not {array.dtype}")
+        raise TypeError(f"values are bool, which voxels are inside, floats, or lists of voxels (n, 3), not {array.dtype}")
     vertices, faces, cell, sheet, _, counts = made
     take_counts(counts, status)
     return vertices, faces, {"cell": cell, "sheet": sheet, "source": np.full(len(vertices), -1, np.int64)}
