@@ -113,11 +113,10 @@ TEST(DeviceCellsAsync, HaveTheBytesOfCallsThatWait) {
 
 // Captured once and replayed with vertices that move, to outside of the grid too.
 TEST(DeviceCellsAsync, GraphsFollowTheVertices) {
-    vp::cuda_backend gpu;
     cudaStream_t stream = nullptr;
     ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
-    gpu.stream = stream;
     {
+        vp::cuda_backend gpu{stream}; // frees its memory on the stream
         const vp::grid g = device_test::box_grid(glm::ivec3(20));
         const mesh_data m = device_test::ball({9, 10, 9}, 5.4f, 6);
         std::vector<vp::mesh<vp::cuda_backend>> meshes;
