@@ -236,7 +236,7 @@ TEST(GpuChoice, TooLittleMemoryIsSaid) {
     const scratch_folder folder;
     const std::string model = folder / "m.glb";
     gltf_test::small_world().write_glb(model);
-    std::vector<std::string> common{model, "-t", "occupancy,color", "--device-memory", "1"};
+    std::vector<std::string> common{model, "-t", "occupancy,color", "--device-memory", "1", "--dense"};
     common.insert(common.end(), large_grid.begin(), large_grid.end());
     const auto arguments = [&](const std::string& out, const std::string& backend) {
         std::vector<std::string> list = common;

@@ -112,11 +112,10 @@ struct memory_access<vp::cuda_backend> {
 
     template <class T, class Value>
     static void read(vp::cuda_backend& backend, T* out, std::size_t count, const Value& value, int threads) {
-        const std::size_t piece = gpu::staging::piece_of(count * sizeof(T)) / sizeof(T);
-        const std::size_t pieces = (count + piece - 1) / piece;
-        constexpr std::size_t little = std::size_t{4}
-                                       << 20; // bytes that are there before memory could be made for them
+        constexpr std::size_t little = std::size_t{4} << 20; // bytes that come sooner than memory for them is made
         const bool is_little = count * sizeof(T) <= little;
+        const std::size_t piece = is_little ? count : gpu::staging::piece_of(count * sizeof(T)) / sizeof(T);
+        const std::size_t pieces = piece == 0 ? 0 : (count + piece - 1) / piece;
         std::vector<vp::cuda_backend::buffer<T>> values;
         for (std::size_t i = 0; i < std::min<std::size_t>(pieces, 2); ++i)
             values.push_back({backend, std::min(count, piece)});

@@ -140,11 +140,12 @@ __global__ __launch_bounds__(threads_per_block) void sum_windings_kernel(std::in
 
 // Decides the samples of bricks by their generalized winding numbers, where these may differ from the others'. A warp
 // takes a brick, whose rows are bytes of the bits.
+// `tree` is no __grid_constant__: nvcc 13.0 makes wrong code of references to it (scripts/check_ptx.py).
 template <class State>
 __global__ __launch_bounds__(threads_per_block) void decide_bricks_kernel(
     const std::int32_t* windings, const std::int32_t* of_cones, const word* on_cones, const std::uint32_t* marks,
-    const __grid_constant__ row_grid grid, const __grid_constant__ core::winding_view tree, fill_rule rule,
-    std::uint8_t* inside, const State* state) {
+    const __grid_constant__ row_grid grid, const core::winding_view tree, fill_rule rule, std::uint8_t* inside,
+    const State* state) {
     if (state->index_error != 0) return;
     const int lane = static_cast<int>(threadIdx.x % 32);
     const auto bricks_of = [](int n) { return static_cast<std::uint64_t>(n + winding_brick - 1) / winding_brick; };
