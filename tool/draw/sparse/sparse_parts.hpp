@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -270,6 +271,71 @@ sparse_volume sparse_pipeline<Backend>::draw_solid(sparse_volume&& surface_of) {
             add_channel(result, wanted).data = std::move(counts.data);
         else
             fill_channel(add_channel(result, wanted), result.num_values(), 1U);
+    }
+    return result;
+}
+
+// Shaders of cut cells: what is untouched becomes tiles.
+struct fraction_anywhere {
+    static constexpr bool ignores_voxel = true;
+    vp::output<float, float, glm::vec3> operator()(const vp::cell_fragment& f) const {
+        return vp::outputs(f.fraction, 0.0F, glm::vec3(0));
+    }
+};
+struct measures_anywhere {
+    static constexpr bool ignores_voxel = true;
+    using fragment = vp::measured_cell<vp::cell_value::centroid, vp::cell_value::area>;
+    vp::output<float, float, glm::vec3> operator()(const fragment& f) const {
+        return vp::outputs(f.fraction, static_cast<float>(f.area), f.centroid);
+    }
+};
+
+template <class Backend>
+sparse_volume sparse_pipeline<Backend>::draw_cells(const voxelpipe::grid& whole) {
+    sparse_volume result;
+    result.shape = volume_of(whole);
+    report_from(0, 1, 0, 1);
+    using real = vp::target<float, vp::blend::replace>;
+    using point = vp::target<glm::vec3, vp::blend::replace>;
+    const voxelpipe::grid grid = this->uploaded_->relative_grid();
+    std::bitset<3> enabled(1);
+    enabled[1] = this->wants(target::area);
+    enabled[2] = this->wants(target::centroid);
+    vp::sparse_framebuffer<Backend, real, real, point> framebuffer(this->backend_, grid.extent, enabled);
+    vp::cell_options options;
+    if (this->request_.close_holes != 0) {
+        options.repair = vp::repair::close_holes;
+        options.max_hole_edges = this->request_.close_holes;
+    }
+    vp::status status;
+    const auto draw_by = [&](const auto& shader) {
+        using draw = vp::draw<vp::mesh_view<>, instanced_vertex_shader, std::remove_cvref_t<decltype(shader)>>;
+        std::vector<draw> draws;
+        for (const auto& d : this->uploaded_->bits_draws()) draws.push_back({d.mesh, d.vertex_shader, shader});
+        status = vp::voxelize_cells(this->backend_, draws, grid, framebuffer, options);
+    };
+    {
+        const typename base::stage_timer timer{*this, "fractions"};
+        if (enabled.count() > 1)
+            draw_by(measures_anywhere{});
+        else
+            draw_by(fraction_anywhere{});
+    }
+    this->check(status, this->request_);
+    fraction_counts counts;
+    counts.open_rows = status.cells.open_rows;
+    counts.rows = static_cast<std::uint64_t>(grid.extent.y) * static_cast<std::uint64_t>(grid.extent.z);
+    this->note_cells(status, counts);
+    const typename base::stage_timer timer{*this, "resolve"};
+    take_bricks(result, framebuffer);
+    const auto* const fractions = values_of<0>(framebuffer);
+    for (const target wanted : this->request_.targets) {
+        if (wanted == target::area) copy<1, float>(result, wanted, framebuffer);
+        if (wanted == target::centroid) copy<2, glm::vec3>(result, wanted, framebuffer);
+        if (wanted == target::fraction)
+            resolve<float>(result, wanted, [=, clamps = this->request_.clamp](std::size_t i) {
+                return clamps ? std::clamp(fractions[i], 0.0F, 1.0F) : fractions[i];
+            });
     }
     return result;
 }

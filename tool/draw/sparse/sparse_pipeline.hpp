@@ -223,7 +223,7 @@ private:
     [[nodiscard]] vp::status draw_solid_bits(const voxelpipe::grid& part, sparse_volume& result, channel& counts);
     // The solid's bricks and tiles, and the values of the surface where that lies in them: in bricks.
     [[nodiscard]] sparse_volume draw_solid(sparse_volume&& surface_of);
-    // What is cut or inside, in one call for the whole grid; on the CPU alone (sparse_voxelizer.cpp).
+    // What is cut or inside, in one call for the whole grid; on the CPU alone.
     [[nodiscard]] sparse_volume draw_cells(const voxelpipe::grid& whole);
 
     template <class Framebuffer>
