@@ -1,0 +1,207 @@
+// SPDX-FileCopyrightText: 2026 The VoxelPipe authors
+// SPDX-License-Identifier: Apache-2.0
+
+// voxelize_distance_async: the bytes and the status of voxelize_distance in the caller's memory, replayed by a graph;
+// and what it says of room that is too small and of bad input, which leave every target as it was.
+#include "distance_drawings.hpp"
+
+#include <voxelpipe/distance/device/distance_async.cuh>
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace {
+
+using namespace distance_drawings;
+
+using async_target = every_target<vp::cuda_backend>;
+using async_draw = vp::draw<vp::mesh_view<>, vp::passthrough, everything>;
+
+// A workspace, filled with a byte.
+struct distance_workspace {
+    vp::cuda_backend::buffer<std::uint8_t> memory;
+    vp::distance_workspace_view view;
+
+    distance_workspace(vp::cuda_backend& gpu, const std::vector<async_draw>& draws, const vp::grid& g, async_target& fb,
+                       const vp::distance_options& o, const vp::distance_limits& limits)
+        : memory(gpu, vp::distance_workspace_bytes(std::span<const async_draw>(draws), g, fb.view(), o, limits)),
+          view{memory.data(), memory.size(), limits} {
+        EXPECT_NE(memory.size(), 0u);
+        EXPECT_EQ(cudaMemsetAsync(memory.data(), 0xa5, memory.size(), gpu.stream), cudaSuccess);
+    }
+};
+
+vp::status run_async(vp::cuda_backend& gpu, const std::vector<async_draw>& draws, const vp::grid& g, async_target& fb,
+                     const vp::distance_options& o, const vp::distance_workspace_view& w) {
+    return vp::voxelize_distance_async(gpu, std::span<const async_draw>(draws), g, fb.view(), o, w);
+}
+
+void expect_same_targets(vp::cuda_backend& gpu, const async_target& a, const async_target& b) {
+    vp::core::for_each_index<num_targets<async_target>>([&]<std::size_t I>() {
+        const std::string what = "target " + std::to_string(I);
+        device_test::expect_same_bytes(vp::get<I>(a).to_host(gpu), vp::get<I>(b).to_host(gpu), what.c_str());
+    });
+}
+
+std::vector<async_draw> async_draws(const std::vector<vp::mesh<vp::cuda_backend>>& meshes) {
+    std::vector<async_draw> draws;
+    for (const auto& m : meshes) draws.push_back({m.view(), {}, {static_cast<std::uint32_t>(draws.size() + 3), 1.5f}});
+    return draws;
+}
+
+} // namespace
+
+// From no room at all, with what each failure asks for; then with spare room. Bands and whole fields, rules and bodies,
+// without a sign, at corners and in a part of a grid.
+TEST(DeviceDistanceAsync, HaveTheBytesOfCallsThatWait) {
+    vp::cuda_backend gpu;
+    const glm::ivec3 extent{33, 21, 27};
+    std::vector<vp::mesh<vp::cuda_backend>> meshes;
+    mesh_data large = device_test::mixed_triangles(80, 20, 5);
+    device_test::add_triangle(large, {-300, 4, 2}, {500, 11, 9}, {10, 300, 400}); // near more than 32 bricks
+    for (const mesh_data& d : {large, device_test::tied_bodies(20, 7, 2), device_test::ball({14, 9, 12}, 6.3f, 7)})
+        meshes.emplace_back(gpu, d.positions, d.triangles);
+    const std::vector<async_draw> draws = async_draws(meshes);
+    const vp::grid whole = unit_grid(extent);
+    int retries = 0;
+    for (const vp::distance_options& o :
+         {vp::distance_options{}, vp::distance_options{.band = 1.5, .rule = vp::fill_rule::even_odd},
+          vp::distance_options{.sample = vp::sample::corner, .rule = vp::fill_rule::positive},
+          vp::distance_options{.bodies = vp::bodies::draw},
+          vp::distance_options{.sign = vp::distance_sign::none, .count_voxels = true},
+          vp::distance_options{.band = vp::band::whole}}) {
+        const vp::grid g = o.sample == vp::sample::corner ? whole.crop({3, 2, 5}, {24, 17, 20}) : whole;
+        const glm::ivec3 samples = vp::core::sample_grid(g, o.sample).extent;
+        async_target waited(gpu, samples), found(gpu, samples);
+        const vp::status expected = vp::voxelize_distance(gpu, draws, g, waited, o);
+        ASSERT_TRUE(expected.ok()) << expected.message();
+        ASSERT_TRUE(vp::clear(gpu, found).ok());
+        const auto before = vp::get<0>(found).to_host(gpu);
+        vp::distance_limits limits;
+        for (int tries = 0;; ++tries) {
+            ASSERT_LT(tries, 4);
+            const distance_workspace room(gpu, draws, g, found, o, limits);
+            ASSERT_TRUE(run_async(gpu, draws, g, found, o, room.view).ok());
+            const vp::status s = vp::read_distance_status(gpu, room.view, &limits);
+            if (s.ok()) {
+                expect_same_status(expected, s);
+                break;
+            }
+            ++retries;
+            ASSERT_EQ(s.code, vp::status_code::capacity_exceeded);
+            ASSERT_EQ(vp::get<0>(found).to_host(gpu), before);
+        }
+        expect_same_targets(gpu, waited, found);
+        // The limits are the least ones, and the crossings those of the status.
+        if (o.sign != vp::distance_sign::none && o.rule != vp::fill_rule::even_odd) {
+            EXPECT_EQ(limits.crossings, expected.solid.crossings);
+            ASSERT_TRUE(vp::clear(gpu, found).ok());
+            const auto empty = vp::get<0>(found).to_host(gpu);
+            vp::distance_limits less = limits;
+            --less.crossings;
+            const distance_workspace room(gpu, draws, g, found, o, less);
+            ASSERT_TRUE(run_async(gpu, draws, g, found, o, room.view).ok());
+            EXPECT_EQ(vp::read_distance_status(gpu, room.view, &less).code, vp::status_code::capacity_exceeded);
+            EXPECT_EQ(less.crossings, limits.crossings);
+            EXPECT_EQ(vp::get<0>(found).to_host(gpu), empty);
+        }
+        const distance_workspace spare(
+            gpu, draws, g, found, o, {limits.pairs + 777, limits.parts + 5, limits.bricks + 13, limits.crossings + 99});
+        ASSERT_TRUE(run_async(gpu, draws, g, found, o, spare.view).ok());
+        expect_same_status(expected, vp::read_distance_status(gpu, spare.view));
+        expect_same_targets(gpu, waited, found);
+    }
+    EXPECT_GE(retries, 6);
+}
+
+// Captured once and replayed with vertices that move, to outside of the grid too.
+TEST(DeviceDistanceAsync, GraphsFollowTheVertices) {
+    cudaStream_t stream = nullptr;
+    ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
+    {
+        vp::cuda_backend gpu{stream}; // frees its memory on the stream
+        const vp::grid g = unit_grid(glm::ivec3(20));
+        const mesh_data m = device_test::ball({9, 10, 9}, 5.4f, 6);
+        std::vector<vp::mesh<vp::cuda_backend>> meshes;
+        meshes.emplace_back(gpu, m.positions, m.triangles);
+        const std::vector<async_draw> draws = async_draws(meshes);
+        async_target waited(gpu, g.extent), found(gpu, g.extent);
+        const distance_workspace room(gpu, draws, g, found, {}, {20000, 100, 100, 5000});
+        ASSERT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
+        cudaGraph_t graph = nullptr;
+        cudaGraphExec_t launchable = nullptr;
+        ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
+        ASSERT_TRUE(run_async(gpu, draws, g, found, {}, room.view).ok());
+        ASSERT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
+        ASSERT_EQ(cudaGraphInstantiate(&launchable, graph, 0), cudaSuccess);
+        for (int frame = 0; frame < 3; ++frame) {
+            std::vector<glm::vec3> moved = m.positions;
+            for (glm::vec3& p : moved) p += glm::vec3(frame == 1 ? 100.0f : 0.3f * static_cast<float>(frame));
+            ASSERT_EQ(cudaMemcpy(const_cast<glm::vec3*>(meshes[0].view().positions.data()), moved.data(),
+                                 moved.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice),
+                      cudaSuccess);
+            ASSERT_EQ(cudaGraphLaunch(launchable, stream), cudaSuccess);
+            const vp::status s = vp::read_distance_status(gpu, room.view);
+            ASSERT_TRUE(s.ok()) << s.message();
+            expect_same_status(vp::voxelize_distance(gpu, draws, g, waited, {}), s);
+            EXPECT_EQ(s.distance.band_samples == 0, frame == 1);
+            expect_same_targets(gpu, waited, found);
+        }
+        EXPECT_EQ(cudaGraphExecDestroy(launchable), cudaSuccess);
+        EXPECT_EQ(cudaGraphDestroy(graph), cudaSuccess);
+    }
+    EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
+}
+
+TEST(DeviceDistanceAsync, BadInputAndWhatItCannotDo) {
+    vp::cuda_backend gpu;
+    const vp::grid g = unit_grid(glm::ivec3(12));
+    mesh_data m = device_test::ball({6, 6, 6}, 4.4f, 5);
+    std::vector<vp::mesh<vp::cuda_backend>> meshes;
+    meshes.emplace_back(gpu, m.positions, m.triangles);
+    m.triangles.push_back({0, 1, 1000000});
+    meshes.emplace_back(gpu, m.positions, m.triangles);
+    const std::vector<async_draw> both = async_draws(meshes), good{both[0]}, none;
+    async_target fb(gpu, g.extent);
+    const distance_workspace room(gpu, both, g, fb, {}, {20000, 100, 100, 5000});
+    ASSERT_TRUE(run_async(gpu, good, g, fb, {}, room.view).ok());
+    ASSERT_TRUE(vp::read_distance_status(gpu, room.view).ok());
+    const auto before = vp::get<0>(fb).to_host(gpu);
+    for (const auto sign : {vp::distance_sign::inside, vp::distance_sign::none}) {
+        ASSERT_TRUE(run_async(gpu, both, g, fb, {.sign = sign}, room.view).ok());
+        EXPECT_EQ(vp::read_distance_status(gpu, room.view).code, vp::status_code::index_out_of_range);
+        EXPECT_EQ(vp::get<0>(fb).to_host(gpu), before);
+    }
+
+    const auto code = [&](const vp::distance_options& o, const vp::distance_workspace_view& w) {
+        return run_async(gpu, good, g, fb, o, w).code;
+    };
+    for (const auto repair : {vp::repair::close_holes, vp::repair::exterior, vp::repair::vote, vp::repair::winding}) {
+        EXPECT_EQ(code({.repair = repair}, room.view), vp::status_code::strategy_unavailable);
+        EXPECT_EQ(vp::distance_workspace_bytes(std::span<const async_draw>(good), g, fb.view(), {.repair = repair},
+                                               room.view.limits),
+                  0u);
+    }
+    EXPECT_EQ(code({.band = -1}, room.view), vp::status_code::bad_distance_options);
+    vp::distance_workspace_view bad = room.view;
+    bad.bytes = 1000;
+    EXPECT_EQ(code({}, bad), vp::status_code::capacity_exceeded);
+    bad = room.view;
+    bad.limits.pairs = std::uint64_t{1} << 33;
+    EXPECT_EQ(code({}, bad), vp::status_code::size_overflow);
+    async_target other(gpu, glm::ivec3(11));
+    EXPECT_EQ(run_async(gpu, good, g, other, {}, room.view).code, vp::status_code::extent_mismatch);
+    // Nothing clears; a mesh without triangles has the band's distance everywhere.
+    ASSERT_TRUE(run_async(gpu, none, g, fb, {}, room.view).ok());
+    EXPECT_TRUE(vp::read_distance_status(gpu, room.view).ok());
+    for (const float v : vp::get<0>(fb).to_host(gpu)) ASSERT_EQ(v, 0.0f);
+    std::vector<vp::mesh<vp::cuda_backend>> empty;
+    empty.emplace_back(gpu, std::vector<glm::vec3>{}, std::vector<glm::uvec3>{});
+    async_target waited(gpu, g.extent);
+    ASSERT_TRUE(run_async(gpu, async_draws(empty), g, fb, {}, room.view).ok());
+    expect_same_status(vp::voxelize_distance(gpu, async_draws(empty), g, waited, {}),
+                       vp::read_distance_status(gpu, room.view));
+    expect_same_targets(gpu, waited, fb);
+}
