@@ -35,7 +35,7 @@ CPP = {
                   "surfaces/remesh.hpp", "surfaces/remesh_sparse.hpp"]),
     "distances": ("Distances", "Signed distances from meshes, and the nearest triangle.",
                   ["distance/distance.hpp", "distance/sparse_distance.hpp", "distance/distance_ray.hpp",
-                   "distance/core/point_triangle.hpp"]),
+                   "distance/device/distance_async.cuh", "distance/core/point_triangle.hpp"]),
     "label": ("Labels", "Connected components of bits.", ["label/label.hpp", "label/voxel_component.hpp"]),
     "cells": ("Cut cells", "How much of each voxel is inside, and where links between voxels are cut.", ["cells/cells.hpp", "cells/sparse_cells.hpp", "cells/device/cells_async.cuh", "cells/links.hpp", "cells/core/link_crossing.hpp"]),
     "sparse": ("Sparse grids", "Memory in proportion to the voxels that are drawn: bricks, octrees, files.",
