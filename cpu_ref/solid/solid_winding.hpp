@@ -166,7 +166,7 @@ private:
         }
     }
     [[nodiscard]] std::size_t row(const glm::ivec3& voxel) const {
-        return static_cast<std::size_t>(voxel.z % side * side + voxel.y % side);
+        return static_cast<std::size_t>(voxel.z % side) * std::size_t{side} + static_cast<std::size_t>(voxel.y % side);
     }
     // Decides the voxels of the brick that begins there.
     void judge(const core::winding_view& tree, const winding_bricks& bricks, const glm::ivec3& brick) {

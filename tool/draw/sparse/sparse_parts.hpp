@@ -194,7 +194,7 @@ void sparse_pipeline<Backend>::draw_outer(sparse_volume& result, int passes) {
                     }
                     column_view view = ends.view();
                     put.erase(put.begin() + static_cast<std::ptrdiff_t>(num_kept), put.end());
-                    for (const std::size_t a : {0, 1})
+                    for (std::size_t a = 0; a < 2; ++a)
                         view.along[a] = ends_of(ends.along[a].data(), ends.along[a].size());
                     view.along[2] = ends_along_z;
                     this->set_columns(view);

@@ -321,7 +321,9 @@ struct winding_sample {
     if (t.num_triangles == 0 || s.is_on_cone) return is_inside(rule, s.k);
     if (tries_bound && is_below_half(t, to_world(t, p))) return is_inside(rule, s.k);
     const std::int64_t k = s.k - s.k_cones + lids_below(t, p); // of the mesh with the tree's lids
-    for (double most = 0x1p-4; most > 0x1p-25; most *= 0x1p-4) {
+    constexpr int steps = 6;                                   // to 2^-24
+    double most = 0x1p-4;
+    for (int i = 0; i < steps; ++i, most *= 0x1p-4) {
         const lid_angles lids = find_lid_angles(t, p, 0.0, most);
         if (!lids.is_known) break;
         const int verdict = verdict_of(rule, static_cast<double>(k) - lids.turns, lids.error);

@@ -123,8 +123,9 @@ private:
         i -= plane;
         if (i < plane) return glm::ivec3(narrow(i % side), narrow(i / side), n);
         i -= plane;
-        const int z = 1 + narrow(i / (4 * n));
-        i %= 4 * n;
+        const std::int64_t around = std::int64_t{4} * n;
+        const int z = 1 + narrow(i / around);
+        i %= around;
         if (i < side) return glm::ivec3(narrow(i), 0, z);
         i -= side;
         if (i < side) return glm::ivec3(narrow(i), n, z);
