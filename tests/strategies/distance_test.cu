@@ -5,6 +5,8 @@
 
 #include "distance_drawings.hpp"
 
+#include <voxelpipe/slabs/stream.hpp>
+
 #include <gtest/gtest.h>
 
 using namespace distance_drawings;
@@ -106,6 +108,41 @@ TEST(DeviceDistance, SparseFramebuffersHaveTheBytesOfTheCpu) {
         for (const vp::sample where : {vp::sample::centre, vp::sample::corner})
             expect_same_bricks({bodies, device_test::ball({30, 20, 9}, 4, 4)}, g, {.band = 2, .sample = where});
     expect_same_bricks({bodies}, unit_grid({13, 9, 10}), {.band = vp::band::whole, .sign = vp::distance_sign::none});
+}
+
+// Slabs of a stream on the device: the whole field of the cpu, with the holes of the whole mesh closed.
+TEST(DeviceDistance, SlabsOfAStreamAreTheWhole) {
+    namespace slabs = vp::slabs;
+    const vp::grid g = unit_grid({14, 17, 20});
+    mesh_data open = device_test::ball({7, 8, 9}, 5.3f, 7);
+    open.triangles.erase(open.triangles.end() - 7, open.triangles.end() - 3);
+    for (const vp::repair repair : {vp::repair::none, vp::repair::close_holes, vp::repair::winding}) {
+        const vp::distance_options how{.band = 2, .repair = repair};
+        vp::cpu_backend cpu;
+        vp::cuda_backend gpu;
+        two_targets<vp::cpu_backend> whole(cpu, g.extent);
+        const vp::status expected = draw(cpu, {open}, g, nearest_shader{}, whole, how, false);
+        ASSERT_TRUE(expected.ok()) << expected.message();
+        slabs::stream stream(gpu, g, vp::passthrough{}, {.num_slabs = 5, .repair = repair, .band = how.band});
+        ASSERT_TRUE(stream.add({open.positions, open.triangles}).ok());
+        std::vector<float> distances;
+        std::vector<std::int64_t> nearest;
+        const vp::status s = stream.draw_distance(
+            nearest_shader{},
+            [&](glm::ivec3 extent) {
+                return two_targets<vp::cuda_backend>{gpu, extent};
+            },
+            [&](const slabs::slab&, const two_targets<vp::cuda_backend>& part) { // layers along z follow each other
+                const auto d = vp::get<0>(part).to_host(gpu);
+                const auto n = vp::get<1>(part).to_host(gpu);
+                distances.insert(distances.end(), d.begin(), d.end());
+                nearest.insert(nearest.end(), n.begin(), n.end());
+            },
+            how);
+        expect_same_status(expected, s);
+        device_test::expect_same_bytes(vp::get<0>(whole).to_host(cpu), distances, "distances");
+        device_test::expect_same_bytes(vp::get<1>(whole).to_host(cpu), nearest, "nearest");
+    }
 }
 
 TEST(DeviceDistance, PointsHaveTheBytesOfTheCpu) {

@@ -62,6 +62,9 @@ struct distance_options {
     int closing = 0;                                      // exterior: gaps that are closed, 0 to max_closing
     std::uint64_t max_hole_edges = std::numeric_limits<std::uint64_t>::max(); // close_holes
     bool count_voxels = true;                                                 // fill counters::voxels
+    // close_holes or winding of a part of a mesh: the cones of the whole one, as solid_options::cones. Null: they are
+    // found.
+    const core::hole_cones* cones = nullptr;
 };
 
 // The triangle that is nearest to a sample: of those with the least distance, as a square in double, the first by draw,
@@ -141,6 +144,7 @@ struct distance_at_tag {};
     s.repair = o.repair;
     s.closing = o.closing;
     s.max_hole_edges = o.max_hole_edges;
+    s.cones = o.cones;
     s.count_voxels = false;
     return s;
 }
@@ -155,7 +159,7 @@ struct distance_at_tag {};
     if (o.sign == distance_sign::none) {
         constexpr distance_options plain;
         const bool is_plain = o.rule == plain.rule && o.bodies == plain.bodies && o.repair == plain.repair &&
-                              o.closing == plain.closing && o.max_hole_edges == plain.max_hole_edges;
+                              o.closing == plain.closing && o.max_hole_edges == plain.max_hole_edges && o.cones == nullptr;
         return is_plain ? status{} : failure(status_code::bad_distance_options);
     }
     return validate(sign_options(o), sample_grid(g, o.sample));

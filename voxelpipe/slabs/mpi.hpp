@@ -116,7 +116,7 @@ public:
 private:
     [[nodiscard]] status add_records(const Mesh& chunk) {
         counters added;
-        const chunk_records<varyings, Mesh> records(chunk, shader_, grid_, options_.binning(), num_triangles_);
+        const chunk_records<varyings, Mesh> records(chunk, shader_, grid_, options_.binning(grid_), num_triangles_);
         status s = records.valid();
         if (s.ok() && repairs_->needs_triangles())
             records.visit_snapped([&](const auto& a, const auto& b, const auto& c) { repairs_->add(a, b, c); });
@@ -219,7 +219,7 @@ private:
 
     [[nodiscard]] core::voxel_box reach_of(const core::snap_transform& snap, const glm::ivec3& extent,
                                            const record_type& r) const {
-        return options_.binning()(snap, extent, r.positions).reach;
+        return options_.binning(grid_)(snap, extent, r.positions).reach;
     }
 
     // The counts of all ranks, and those of the ranks below. Every rank.

@@ -284,6 +284,36 @@ struct classified {
     return t;
 }
 
+// Classifies a triangle as voxelize_distance does, whose band reaches `halo` layers beyond the grid (core::band_halo).
+// Its reach are the samples that it may be near, but along x all, because its crossings count for the sign, whether it
+// is drawn or outside.
+[[nodiscard]] VOXELPIPE_HD inline classified classify_for_distance(const core::snap_transform& snap,
+                                                                   const glm::ivec3& extent, const glm::ivec3& halo,
+                                                                   const glm::vec3& a, const glm::vec3& b,
+                                                                   const glm::vec3& c) {
+    const auto snapped = [&](const glm::vec3& p) { return core::snap(snap, p.x, p.y, p.z); };
+    const core::snapped_position p = snapped(a), q = snapped(b), r = snapped(c);
+    classified t;
+    t.kind = core::classify_positions(p, q, r);
+    t.reach = {{{0, 0, 0}}, {{-1, -1, -1}}};
+    if (t.kind != core::triangle_class::drawn) return t;
+    const core::voxel_box box = core::bounds(p, q, r, snap.fraction);
+    core::voxel_box whole{}, near{}, reach{};
+    for (int k = 0; k < 3; ++k) {
+        // A whole field has no outside.
+        const std::int64_t layers = halo[k] < 2 * grid::max_extent ? halo[k] : std::int64_t{1} << 42;
+        near.lo[k] = -layers;
+        near.hi[k] = extent[k] - 1 + layers;
+        whole.lo[k] = 0;
+        whole.hi[k] = extent[k] - 1;
+        reach.lo[k] = k == 0 ? 0 : box.lo[k] - layers;
+        reach.hi[k] = k == 0 ? whole.hi[k] : box.hi[k] + layers;
+    }
+    if (core::intersect(box, near).empty()) t.kind = core::triangle_class::outside;
+    t.reach = core::intersect(reach, whole);
+    return t;
+}
+
 // Adds what different slabs have drawn: fragments, voxels and rows. Their triangles are not added up.
 inline void add_drawn(status& all, const status& one) {
     all.counts.fragments += one.counts.fragments;
@@ -292,6 +322,7 @@ inline void add_drawn(status& all, const status& one) {
     all.solid.open_rows += one.solid.open_rows;
     all.solid.crossings += one.solid.crossings;
     all.solid.max_winding = std::max(all.solid.max_winding, one.solid.max_winding);
+    all.distance.band_samples += one.distance.band_samples;
     cell_counters& c = all.cells;
     const std::uint64_t low = c.volume_low + one.cells.volume_low;
     c.volume_high += one.cells.volume_high + (low < c.volume_low ? 1 : 0);

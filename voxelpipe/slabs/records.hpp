@@ -7,6 +7,7 @@
 // a slab.
 
 #include <voxelpipe/core/threads.hpp>
+#include <voxelpipe/distance/distance.hpp>
 #include <voxelpipe/slabs/plan.hpp>
 #include <voxelpipe/solid/solid.hpp>
 #include <voxelpipe/voxelize.hpp>
@@ -63,6 +64,20 @@ struct numbered_shader {
         return shader(f);
     }
 };
+// A distance's shader, likewise.
+template <class Shader>
+struct numbered_distance {
+    Shader shader;
+    const std::uint32_t* numbers;
+
+    VOXELPIPE_ANY_CALLABLE
+    template <class V>
+    VOXELPIPE_HD auto operator()(const distance_fragment<V>& nearest) const {
+        distance_fragment<V> f = nearest;
+        if (f.in_band) f.triangle = f.primitive = numbers[nearest.triangle];
+        return shader(f);
+    }
+};
 // Gives the lists of a slab the numbers of the whole mesh. Triangles keep their order, so that lists stay sorted.
 struct renumber_list {
     std::uint32_t* primitives;
@@ -77,15 +92,22 @@ struct binning {
     coverage rule = coverage::conservative;             // of surfaces
     bool is_solid = false;                              // for voxelize_solid
     voxelpipe::repair repair = voxelpipe::repair::none; // of solids
+    glm::ivec3 halo = glm::ivec3(-1);                   // for voxelize_distance: core::band_halo; below 0: another call
 
     // As classify(), for a triangle's three corners. `drawn` with an empty reach: counted as drawn, but no slab needs
     // it.
     [[nodiscard]] VOXELPIPE_HD classified operator()(const core::snap_transform& snap, const glm::ivec3& extent,
                                                      const glm::vec3 (&at)[3]) const {
+        if (is_distance()) return classify_for_distance(snap, extent, halo, at[0], at[1], at[2]);
         if (is_solid && repair == repair::vote) return classify_for_vote(snap, extent, at[0], at[1], at[2]);
         if (is_solid && repair == repair::exterior) // a cover is all that counts
             return classify(snap, extent, coverage::conservative, at[0], at[1], at[2]);
         return classify(snap, extent, rule, at[0], at[1], at[2], is_solid);
+    }
+    [[nodiscard]] VOXELPIPE_HD bool is_distance() const { return halo.x >= 0; }
+    // True if slabs may need a triangle of this class.
+    [[nodiscard]] VOXELPIPE_HD bool takes(core::triangle_class kind) const {
+        return kind == core::triangle_class::drawn || (is_distance() && kind == core::triangle_class::outside);
     }
 };
 
@@ -132,7 +154,7 @@ public:
             r.number = static_cast<std::uint32_t>(number(i));
             const classified c = how_(snap_, extent_, r.positions);
             core::count_class(counts, c.kind);
-            if (c.kind == core::triangle_class::drawn && !c.reach.empty()) visit(std::as_const(r), c.reach);
+            if (how_.takes(c.kind) && !c.reach.empty()) visit(std::as_const(r), c.reach);
         }
         return {};
     }

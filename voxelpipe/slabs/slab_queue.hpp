@@ -128,7 +128,7 @@ private:
         }
         const glm::ivec3 extent = whole.where.extent;
         const core::snap_transform snap = core::make_snap_transform(whole.where);
-        const auto reach_of = [&, how = options.binning()](const record_type& r) {
+        const auto reach_of = [&, how = options.binning(whole.where)](const record_type& r) {
             return how(snap, extent, r.positions).reach;
         };
         histogram counts(extent);

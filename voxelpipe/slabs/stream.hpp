@@ -15,12 +15,14 @@
 // sees what it sees in the whole call: triangle and primitive are numbers in the whole mesh.
 
 #include <voxelpipe/cells/sparse_cells.hpp>
+#include <voxelpipe/distance/sparse_distance.hpp>
 #include <voxelpipe/slabs/bins.hpp>
 #include <voxelpipe/slabs/plan.hpp>
 #include <voxelpipe/slabs/records.hpp>
 #include <voxelpipe/slabs/repairs.hpp>
 #include <voxelpipe/slabs/route.hpp>
 #include <voxelpipe/slabs/slab_arrays.hpp>
+#include <voxelpipe/slabs/slab_lists.hpp>
 #include <voxelpipe/slabs/slab_queue.hpp>
 #include <voxelpipe/slabs/stream_options.hpp>
 #include <voxelpipe/solid/solid.hpp>
@@ -40,15 +42,6 @@
 
 namespace voxelpipe::slabs {
 
-// What a sink gets beside a slab's framebuffer or lists.
-struct slab {
-    grid where;   // a crop of the stream's grid
-    status drawn; // of the slab's call: its fragments and voxels
-    // Voxels and fragments in the slabs before this one. A-buffers of slabs along z follow each other: these are the
-    // offsets at which this one's lists begin.
-    std::uint64_t voxels_before = 0, fragments_before = 0;
-};
-
 // Varyings: those of the vertex shader. The stream refers to the backend. A stream is drawn once.
 template <class Backend, class Varyings>
 class record_stream {
@@ -61,7 +54,7 @@ public:
           threads_(options_.threads != 0 ? options_.threads : std::max(1u, std::thread::hardware_concurrency())),
           router_(threads_, options_.memory / 16),
           repairs_(g, options_.repair, options_.memory / 8, options_.folder, threads_) {
-        options_.is_solid = options_.binning().is_solid;
+        options_.is_solid = options_.binning(g).is_solid;
         cut_into(equal_layers(g, 2, std::max(1, options_.num_slabs), options_.align));
     }
 
@@ -118,15 +111,17 @@ public:
     // whose triangles and targets exceed the budget, or whose call runs out of memory, is cut again: along z, then y,
     // then x; A-buffers along z alone. Returns the counts of the whole, or the failure of a call; what earlier slabs
     // gave has reached the sink by then. bad_solid_options: the triangles were binned for solids, which count others as
-    // drawn. Throws what sink throws, what make throws other than std::bad_alloc, which cuts the slab, and
-    // std::system_error of files.
+    // drawn; bad_distance_options: for distances. Throws what sink throws, what make throws other than std::bad_alloc,
+    // which cuts the slab, and std::system_error of files.
     template <class FragmentShader, class Make, class Sink>
     [[nodiscard]] status draw(const FragmentShader& shader, const Make& make, const Sink& sink) {
+        if (options_.band) return core::failure(status_code::bad_distance_options);
         if (options_.is_solid) return core::failure(status_code::bad_solid_options);
         const auto call = [&](const auto& draws, const grid& g, auto& out) {
             return voxelize(backend_, draws, g, out, options_.voxelize);
         };
-        return with_sink(sink, [&](const auto& to) { return draw_slabs<false>(shader, make, to, 0.75, call); });
+        return with_sink(sink,
+                         [&](const auto& to) { return draw_slabs<kinds::surface>(shader, make, to, 0.75, call); });
     }
     // Draws solids: the voxels, the counts and the counts of rows of one call with the whole mesh, which is one draw.
     // Slabs are along y or z, with vote and exterior along z. how.repair is that of stream_options; how.cones and
@@ -140,8 +135,8 @@ public:
     template <class SolidShader, class Make, class Sink>
     [[nodiscard]] status draw_solid(const SolidShader& shader, const Make& make, const Sink& sink,
                                     const solid_options& how = {}) {
-        if (!options_.is_solid || how.repair != options_.repair || how.slab != nullptr || how.cones != nullptr ||
-            axis_ == 0 || (repairs_.is_along_z() && axis_ != 2))
+        if (!options_.is_solid || options_.band || how.repair != options_.repair || how.slab != nullptr ||
+            how.cones != nullptr || axis_ == 0 || (repairs_.is_along_z() && axis_ != 2))
             return core::failure(status_code::bad_solid_options);
         if (!has_walls_)
             if (const status s = core::validate(how, grid_); !s.ok()) return s;
@@ -153,7 +148,7 @@ public:
             const auto call = [&](const auto& draws, const grid& g, auto& out) {
                 return voxelize_solid(backend_, draws, g, out, repairs_.of(g, how));
             };
-            return draw_slabs<true>(shader, make, to, repairs_.needs_walls() ? share_beside_flood : 0.75, call);
+            return draw_slabs<kinds::solid>(shader, make, to, repairs_.needs_walls() ? share_beside_flood : 0.75, call);
         });
     }
     // Draws cut cells: the fractions, and the counts but for open_edges, of one voxelize_cells with the whole mesh,
@@ -165,25 +160,52 @@ public:
     [[nodiscard]] status draw_cells(const CellShader& shader, const Make& make, const Sink& sink,
                                     const cell_options& how = {}) {
         if (const status s = core::validate(how); !s.ok()) return s;
-        if (!options_.is_solid || how.repair != options_.repair || how.cones != nullptr || how.axis != 0 || axis_ == 0)
+        if (!options_.is_solid || options_.band || how.repair != options_.repair || how.cones != nullptr ||
+            how.axis != 0 || axis_ == 0)
             return core::failure(status_code::bad_cell_options);
         return with_sink(sink, [&](const auto& to) {
             solid_options holes;
             holes.repair = how.repair;
             holes.max_hole_edges = how.max_hole_edges;
             if (const status s = repairs_.begin(holes); !s.ok()) return s;
-            status all = draw_slabs<true>(shader, make, to, 0.75, [&](const auto& draws, const grid& g, auto& out) {
-                cell_options of_slab = how;
-                of_slab.count_open_edges = false; // a slab has some of the triangles
-                of_slab.cones = repairs_.of(g, holes).cones;
-                return voxelize_cells(backend_, draws, g, out, of_slab);
-            });
+            status all =
+                draw_slabs<kinds::solid>(shader, make, to, 0.75, [&](const auto& draws, const grid& g, auto& out) {
+                    cell_options of_slab = how;
+                    of_slab.count_open_edges = false; // a slab has some of the triangles
+                    of_slab.cones = repairs_.of(g, holes).cones;
+                    return voxelize_cells(backend_, draws, g, out, of_slab);
+                });
             move_holes_to_cells(all);
             return all;
         });
     }
+    // Draws distances: the bytes and the counts of one voxelize_distance with the whole mesh, which is one draw. The
+    // stream is made for how.band (stream_options::band), with how.repair as its repair: none, close_holes or winding.
+    // make gives framebuffers or sparse framebuffers. Slabs are along y or z, samples are centres, and a slab has the
+    // triangles within the band; with band::whole each has all of them. how.cones are found by the stream, and not
+    // given. Memory beyond the targets, which the budget does not count: as for voxelize_distance, of a slab's
+    // triangles. bad_distance_options: another stream or option.
+    template <class DistanceShader, class Make, class Sink>
+    [[nodiscard]] status draw_distance(const DistanceShader& shader, const Make& make, const Sink& sink,
+                                       const distance_options& how = {}) {
+        if (const status s = core::validate(how, grid_); !s.ok()) return s;
+        if (options_.band != how.band || how.repair != options_.repair || repairs_.is_along_z() ||
+            how.cones != nullptr || how.sample != sample::centre || axis_ == 0)
+            return core::failure(status_code::bad_distance_options);
+        return with_sink(sink, [&](const auto& to) {
+            const solid_options holes = core::sign_options(how);
+            if (const status s = repairs_.begin(holes); !s.ok()) return s;
+            return draw_slabs<kinds::distance>(shader, make, to, 0.75,
+                                               [&](const auto& draws, const grid& g, auto& out) {
+                                                   distance_options of_slab = how;
+                                                   of_slab.cones = repairs_.of(g, holes).cones;
+                                                   return voxelize_distance(backend_, draws, g, out, of_slab);
+                                               });
+        });
+    }
 
 private:
+    enum class kinds { surface, solid, distance };      // of calls that draw a slab
     static constexpr double share_beside_flood = 0.625; // of the memory, an eighth of which the flood has
     using arrays = detail::slab_arrays<Varyings>;
     using queue_type = detail::slab_queue<Varyings>;
@@ -217,14 +239,14 @@ private:
     }
 
     // share: of the memory, that a slab may take. call(draws, grid, output) draws a slab.
-    template <bool IsSolid, class Shader, class Make, class Sink, class Call>
+    template <kinds Kind, class Shader, class Make, class Sink, class Call>
     [[nodiscard]] status draw_slabs(const Shader& shader, const Make& make, const Sink& sink, double share,
                                     const Call& call) {
         using output = std::remove_cvref_t<decltype(make(grid_.extent))>;
         constexpr bool lists = detail::is_abuffer<output>;
         if (lists && axis_ != 2) return core::failure(status_code::bad_crop);
-        if (!has_walls_) enqueue(lists || repairs_.is_along_z() ? 2 : IsSolid ? 1 : 0);
-        if constexpr (IsSolid)
+        if (!has_walls_) enqueue(lists || repairs_.is_along_z() ? 2 : Kind != kinds::surface ? 1 : 0);
+        if constexpr (Kind != kinds::surface)
             if (repairs_.needs_walls() && !has_walls_) {
                 if (const status s = draw_walls(); !s.ok()) return s;
                 repairs_.flood();
@@ -239,22 +261,22 @@ private:
                                 part.voxels_before = all.counts.voxels;
                                 part.fragments_before = all.counts.fragments;
                                 output out = make(part.where.extent);
-                                if constexpr (IsSolid) {
+                                if constexpr (Kind != kinds::surface) {
                                     repairs_.enter(next.where, next.triangles);
                                     if (triangles.numbers.size() == 0 && repairs_.fills_without_triangles())
                                         triangles = arrays::dropped();
                                 }
-                                part.drawn = draw_one<IsSolid>(std::move(triangles), shader, part.where, out, call);
+                                part.drawn = draw_one<Kind>(std::move(triangles), shader, part.where, out, call);
                                 if (part.drawn.ok()) {
                                     add_drawn(all, part.drawn);
                                     if (!sink(std::as_const(part), out)) // any failure ends the loop; with_sink throws
                                         return core::failure(status_code::device_error);
-                                    if constexpr (IsSolid) repairs_.leave();
+                                    if constexpr (Kind != kinds::surface) repairs_.leave();
                                 }
                                 return part.drawn;
                             });
         if (!s.ok()) return s;
-        if constexpr (IsSolid) repairs_.count(all.solid);
+        if constexpr (Kind != kinds::surface) repairs_.count(all.solid);
         const counters drawn = all.counts;
         all.counts = counts_;
         all.counts.fragments = drawn.fragments;
@@ -282,16 +304,16 @@ private:
                                    if (triangles.numbers.size() == 0) return {};
                                    cover out(backend_, next.where.extent);
                                    const status drawn =
-                                       draw_one<false>(std::move(triangles), constant(true), next.where, out,
-                                                       [&](const auto& draws, const grid& g, auto& to) {
-                                                           return voxelize(backend_, draws, g, to, how);
-                                                       });
+                                       draw_one<kinds::surface>(std::move(triangles), constant(true), next.where, out,
+                                                                [&](const auto& draws, const grid& g, auto& to) {
+                                                                    return voxelize(backend_, draws, g, to, how);
+                                                                });
                                    if (drawn.ok()) repairs_.add_walls(out.to_host(backend_).table());
                                    return drawn;
                                });
     }
 
-    template <bool IsSolid, class Shader, class Output, class Call>
+    template <kinds Kind, class Shader, class Output, class Call>
     [[nodiscard]] status draw_one(arrays triangles, const Shader& shader, const grid& g, Output& out,
                                   const Call& call) {
         const auto run = [&](const typename mesh_types::view& mesh, const std::uint32_t* numbers) {
@@ -302,11 +324,13 @@ private:
                 return call(std::span<const draw_type>(&d, 1), g, out);
             };
             status s;
-            if constexpr (core::is_constant<Shader> || IsSolid)
+            if constexpr (core::is_constant<Shader> || Kind == kinds::solid || std::is_same_v<Shader, distance>)
                 s = one_draw(shader);
+            else if constexpr (Kind == kinds::distance)
+                s = one_draw(detail::numbered_distance<Shader>{shader, numbers});
             else
                 s = one_draw(detail::numbered_shader<Shader>{shader, numbers});
-            if constexpr (detail::is_abuffer<Output> && !IsSolid)
+            if constexpr (detail::is_abuffer<Output> && Kind == kinds::surface)
                 if (s.ok())
                     backend_.for_each(out.primitives.size(), detail::renumber_list{out.primitives.data(), numbers});
             return s;
@@ -352,7 +376,7 @@ class stream : public record_stream<Backend, detail::varyings_of<Mesh, VertexSha
 public:
     // Throws std::invalid_argument for a grid that is not valid.
     stream(Backend& backend, const grid& g, const VertexShader& shader, const stream_options& options = {})
-        : base(backend, g, options), shader_(shader), how_(options.binning()) {}
+        : base(backend, g, options), shader_(shader), how_(options.binning(g)) {}
 
     // Adds triangles of host memory; they are numbered on from those before. Fails for an index that names no vertex,
     // for more than 2^32 - 1 triangles, and for instances. What was added before a failure stays.
@@ -371,19 +395,5 @@ private:
     binning how_;
     std::uint64_t num_triangles_ = 0;
 };
-
-// Appends the lists of a slab along z to those of the slabs before it, as one call with the whole grid orders them.
-template <class Payload>
-void append(host_abuffer<Payload>& whole, const grid& whole_grid, const slab& s, const host_abuffer<Payload>& part) {
-    const glm::ivec3 e = whole_grid.extent, from = s.where.offset - whole_grid.offset;
-    whole.extent = e;
-    const auto area = static_cast<std::uint64_t>(e.x) * static_cast<std::uint64_t>(e.y);
-    for (const std::uint64_t v : part.voxels) whole.voxels.push_back(v + area * static_cast<std::uint64_t>(from.z));
-    if (!part.voxels.empty() && !whole.offsets.empty()) whole.offsets.pop_back();
-    const std::uint64_t before = whole.primitives.size();
-    for (const std::uint64_t o : part.offsets) whole.offsets.push_back(o + before);
-    whole.primitives.insert(whole.primitives.end(), part.primitives.begin(), part.primitives.end());
-    whole.payloads.insert(whole.payloads.end(), part.payloads.begin(), part.payloads.end());
-}
 
 } // namespace voxelpipe::slabs

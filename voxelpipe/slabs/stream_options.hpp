@@ -4,11 +4,13 @@
 
 // How a stream works.
 
+#include <voxelpipe/distance/distance.hpp>
 #include <voxelpipe/slabs/records.hpp>
 #include <voxelpipe/solid/solid.hpp>
 #include <voxelpipe/voxelize.hpp>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 namespace voxelpipe::slabs {
@@ -27,13 +29,17 @@ struct stream_options {
     // voxel is what the targets take, and a byte more for vote and exterior.
     double triangle_bytes = 0, voxel_bytes = 0;
     bool is_solid = false; // for draw_solid and draw_cells: triangles beside the grid along x count too
-    // For draw_solid or draw_cells with this repair, whose search begins while triangles come; is_solid then.
+    // For draw_solid, draw_cells or draw_distance with this repair, whose search begins while triangles come; is_solid
+    // then.
     voxelpipe::repair repair = voxelpipe::repair::none;
+    // For draw_distance with this band, which decides what triangles a slab needs; that or the options above.
+    std::optional<voxelpipe::band> band = std::nullopt;
     unsigned threads = 0; // of the host, that shade, bin and read; 0: all cores. Results do not depend on it
 
-    // As a triangle is binned.
-    [[nodiscard]] slabs::binning binning() const {
-        return {voxelize.rule, is_solid || repair != voxelpipe::repair::none, repair};
+    // As a triangle of a grid is binned.
+    [[nodiscard]] slabs::binning binning(const grid& g) const {
+        return {voxelize.rule, is_solid || repair != voxelpipe::repair::none, repair,
+                band ? core::band_halo(*band, g) : glm::ivec3(-1)};
     }
 };
 
