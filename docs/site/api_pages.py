@@ -44,7 +44,7 @@ CPP = {
     "levels": ("Levels and rays of dense grids", "Coarser levels of targets, levels of light for cone tracing, rays through bits.",
                ["levels/dense_levels.hpp", "levels/direction_mips.hpp", "levels/dense_bits.hpp", "levels/cell_walk.hpp"]),
     "slabs": ("Slabs", "Meshes and grids beyond one memory or one machine: plans, out-of-core streams, MPI.",
-              ["slabs/stream.hpp", "slabs/mpi.hpp", "slabs/plan.hpp", "slabs/records.hpp", "slabs/bins.hpp"]),
+              ["slabs/stream.hpp", "slabs/slab_lists.hpp", "slabs/mpi.hpp", "slabs/plan.hpp", "slabs/records.hpp", "slabs/bins.hpp"]),
     "streams": ("Streams and graphs", "Calls that never wait, with memory of the caller. For cuda_backend.",
                 ["device/voxelize_async.cuh", "device/abuffer_async.cuh", "solid/device/solid_async.cuh",
                  "sparse/device/sparse_result.cuh", "sparse/device/sparse_async.cuh", "sparse/device/sparse_merge_async.cuh", "sparse/device/sparse_solid_async.cuh", "programs/device/program_async.cuh",

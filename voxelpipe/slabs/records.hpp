@@ -104,6 +104,7 @@ struct binning {
             return classify(snap, extent, coverage::conservative, at[0], at[1], at[2]);
         return classify(snap, extent, rule, at[0], at[1], at[2], is_solid);
     }
+    // True for voxelize_distance.
     [[nodiscard]] VOXELPIPE_HD bool is_distance() const { return halo.x >= 0; }
     // True if slabs may need a triangle of this class.
     [[nodiscard]] VOXELPIPE_HD bool takes(core::triangle_class kind) const {
