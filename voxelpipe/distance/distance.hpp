@@ -159,7 +159,8 @@ struct distance_at_tag {};
     if (o.sign == distance_sign::none) {
         constexpr distance_options plain;
         const bool is_plain = o.rule == plain.rule && o.bodies == plain.bodies && o.repair == plain.repair &&
-                              o.closing == plain.closing && o.max_hole_edges == plain.max_hole_edges && o.cones == nullptr;
+                              o.closing == plain.closing && o.max_hole_edges == plain.max_hole_edges &&
+                              o.cones == nullptr;
         return is_plain ? status{} : failure(status_code::bad_distance_options);
     }
     return validate(sign_options(o), sample_grid(g, o.sample));
