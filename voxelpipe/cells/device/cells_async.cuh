@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// voxelize_cells_async: as voxelize_cells into a framebuffer, without waits and allocations, as a CUDA graph needs it; a
-// captured graph of it has run on the emulated device alone (records/h200). It works in the caller's memory, in arrays
-// whose room is given; a call that does not fit leaves every target as it was, and read_cells_status says what was
-// needed.
+// voxelize_cells_async: as voxelize_cells into a framebuffer, without waits and allocations, as a CUDA graph needs it;
+// a captured graph of it has run on the emulated device alone (records/h200). It works in the caller's memory, in
+// arrays whose room is given; a call that does not fit leaves every target as it was, and read_cells_status says what
+// was needed.
 
 #include <voxelpipe/cells/device/cells.cuh>
 #include <voxelpipe/device/base/for_each.cuh>
