@@ -8,11 +8,13 @@
 
 #include <voxelpipe/abuffer.hpp>
 #include <voxelpipe/blend.hpp>
+#include <voxelpipe/cells/cell_programs.hpp>
 #include <voxelpipe/cells/cells.hpp>
 #include <voxelpipe/cells/links.hpp>
 #include <voxelpipe/cells/sparse_cells.hpp>
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/distance/distance.hpp>
+#include <voxelpipe/distance/distance_programs.hpp>
 #include <voxelpipe/distance/distance_ray.hpp>
 #include <voxelpipe/distance/sparse_distance.hpp>
 #include <voxelpipe/formats/formats.hpp>

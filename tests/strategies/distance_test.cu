@@ -5,6 +5,8 @@
 
 #include "distance_drawings.hpp"
 
+#include "../programs/module_cases.hpp"
+
 #include <voxelpipe/slabs/devices.cuh>
 #include <voxelpipe/slabs/stream.hpp>
 
@@ -209,6 +211,13 @@ TEST(DeviceDistance, SlabsOfSeveralGpusAreTheWhole) {
             });
             EXPECT_EQ(parts.draw(vp::constant(true), bits).code, status_code::bad_distance_options);
         }
+}
+
+// What programs make has the distances of a mesh, on either backend, with the numbers of the input.
+TEST(DeviceDistance, ProgramsAreTheMadeMesh) {
+    vp::cuda_backend gpu;
+    programs::expect_distances_of_programs(gpu);
+    programs::expect_distances_without_what_is_left_out(gpu);
 }
 
 TEST(DeviceDistance, PointsHaveTheBytesOfTheCpu) {
