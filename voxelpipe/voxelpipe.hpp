@@ -14,7 +14,6 @@
 #include <voxelpipe/cells/sparse_cells.hpp>
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/distance/distance.hpp>
-#include <voxelpipe/distance/distance_programs.hpp>
 #include <voxelpipe/distance/distance_ray.hpp>
 #include <voxelpipe/distance/sparse_distance.hpp>
 #include <voxelpipe/formats/formats.hpp>
@@ -22,6 +21,7 @@
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/label/label.hpp>
 #include <voxelpipe/mesh.hpp>
+#include <voxelpipe/programs/distance_programs.hpp>
 #include <voxelpipe/programs/element_call.hpp>
 #include <voxelpipe/programs/elements.hpp>
 #include <voxelpipe/programs/field.hpp>

@@ -34,7 +34,7 @@ CPP = {
                  ["surfaces/surface.hpp", "surfaces/extract.hpp", "surfaces/extract_slab.hpp", "surfaces/extract_sparse.hpp", "surfaces/device/extract_async.cuh",
                   "surfaces/remesh.hpp", "surfaces/remesh_sparse.hpp"]),
     "distances": ("Distances", "Signed distances from meshes, and the nearest triangle.",
-                  ["distance/distance.hpp", "distance/sparse_distance.hpp", "distance/distance_programs.hpp", "distance/distance_ray.hpp",
+                  ["distance/distance.hpp", "distance/sparse_distance.hpp", "programs/distance_programs.hpp", "distance/distance_ray.hpp",
                    "distance/device/distance_async.cuh", "distance/core/point_triangle.hpp"]),
     "label": ("Labels", "Connected components of bits.", ["label/label.hpp", "label/voxel_component.hpp"]),
     "cells": ("Cut cells", "How much of each voxel is inside, and where links between voxels are cut.", ["cells/cells.hpp", "cells/sparse_cells.hpp", "cells/cell_programs.hpp", "cells/device/cells_async.cuh", "cells/links.hpp", "cells/core/link_crossing.hpp"]),

@@ -5,7 +5,7 @@
 // Distances and cut cells of programs, on either backend: those of the meshes that the programs make.
 
 #include <voxelpipe/cells/cell_programs.hpp>
-#include <voxelpipe/distance/distance_programs.hpp>
+#include <voxelpipe/programs/distance_programs.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <gtest/gtest.h>

@@ -98,7 +98,7 @@ struct emitted_shader<FragmentShader, V, true> {
     return p;
 }
 
-// A position that is none, for the same.
+// No position: for triangles that are left out of distances, because one outside the grid would be nearest somewhere.
 inline constexpr glm::vec3 position_nowhere(std::numeric_limits<float>::quiet_NaN());
 
 template <class Mesh, class VertexShader, class FragmentShader, class Amplify>
@@ -166,7 +166,7 @@ inline constexpr bool counts_left_out<tessellate_then_geometry<Tessellation, Geo
     s.counts.triangles_outside -= std::min(s.counts.triangles_outside, left_out);
     return s;
 }
-// The same where they lie nowhere, because a triangle outside would have distances too.
+// As without_left_out, for triangles at position_nowhere.
 [[nodiscard]] inline status without_left_out_nowhere(status s, std::uint64_t left_out) {
     s.counts.triangles_in -= std::min(s.counts.triangles_in, left_out);
     s.counts.triangles_nonfinite -= std::min(s.counts.triangles_nonfinite, left_out);
