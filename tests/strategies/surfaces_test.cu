@@ -135,7 +135,7 @@ TEST(DeviceSurfaces, StreamedOnesHaveTheBytesOfTheCpu) {
         EXPECT_GT(whole.vertices.size(), 200u);
         const streamed_surface found = stream_surface(gpu, m, g, o, how, {.num_slabs = 5});
         EXPECT_TRUE(found.surface.has_same_arrays(whole)) << found.surface.status.message();
-        EXPECT_EQ(found.pieces, 5);
+        EXPECT_EQ(found.pieces, 4); // the two layers of the first slab wait
     };
     expect_stream({}, vp::solid_options{});
     expect_stream({.level = 0.03}, vp::distance_options{});
