@@ -32,7 +32,7 @@ CPP = {
     "solids": ("Solids", "The inside of meshes.", ["solid/solid.hpp", "solid/diagnose_repair.hpp", "solid/core/crossing.hpp", "solid/core/row_crossing.hpp"]),
     "surfaces": ("Surfaces", "Closed manifold meshes of bits, fields and any triangles.",
                  ["surfaces/surface.hpp", "surfaces/extract.hpp", "surfaces/extract_slab.hpp", "surfaces/surface_layers.hpp", "surfaces/extract_sparse.hpp", "surfaces/device/extract_async.cuh",
-                  "surfaces/remesh.hpp", "surfaces/remesh_slab.hpp", "surfaces/remesh_sparse.hpp"]),
+                  "surfaces/remesh.hpp", "surfaces/remesh_slab.hpp", "surfaces/remesh_sparse.hpp", "surfaces/device/remesh_async.cuh"]),
     "distances": ("Distances", "Signed distances from meshes, and the nearest triangle.",
                   ["distance/distance.hpp", "distance/sparse_distance.hpp", "distance/distance_ray.hpp",
                    "distance/device/distance_async.cuh", "distance/core/point_triangle.hpp"]),

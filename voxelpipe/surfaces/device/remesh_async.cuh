@@ -156,7 +156,7 @@ public:
         using namespace core::passes;
         check(cudaMemsetAsync(state_, 0, sizeof(remesh_state), stream));
         // A solid that fails leaves its target as it was, which is nothing.
-        zero_memory(bits_, sizeof(word) * bits_target::map::elements(samples_.extent), stream);
+        check(cudaMemsetAsync(bits_, 0, sizeof(word) * bits_target::map::elements(samples_.extent), stream));
         if (triangles_ != 0) {
             check_subsets(draws_, &state_->call.index_error, stream);
             const auto call = solid(bits_);
