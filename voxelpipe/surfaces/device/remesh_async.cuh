@@ -79,6 +79,18 @@ struct bound_mesh_crossings {
         if (*total > room) surface->cells = surface->vertices = surface->quads = 0;
     }
 };
+// Counts zeros where the call has failed, since indices may name no vertex then.
+template <int Axis>
+struct list_unless_stopped {
+    core::passes::list_mesh_crossings<Axis> list;
+    const std::uint64_t* cells;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (*cells != 0)
+            list(i);
+        else
+            list.counts[i] = 0;
+    }
+};
 // Keys behind the crossings, which are sorted to the end.
 struct fill_crossing_keys {
     const unsigned long long* total;
@@ -286,19 +298,6 @@ private:
                                                 state_->edges};
         run(extract_->room().cells, bounded<cross_mesh<Axis, cell_list>>{cross, any}, stream);
     }
-
-    // Counts zeros where the call has failed, since indices may name no vertex then.
-    template <int Axis>
-    struct list_unless_stopped {
-        core::passes::list_mesh_crossings<Axis> list;
-        const std::uint64_t* cells;
-        VOXELPIPE_HD void operator()(std::uint64_t i) const {
-            if (*cells != 0)
-                list(i);
-            else
-                list.counts[i] = 0;
-        }
-    };
 
     std::span<const draw_type> draws_;
     grid samples_;
