@@ -68,7 +68,7 @@ TEST(SurfaceSlabs, OfBitsAreTheWhole) {
 
 TEST(SurfaceSlabs, OfFieldsAreTheWhole) { expect_the_whole<float>({.level = 0.1}); }
 
-// Crossings along z are those of all triangles below, cones and bodies included.
+// Crossings along z are those of all triangles below, cones included.
 TEST(SurfaceSlabs, OfRemeshesAreTheWhole) {
     const vp::grid around = grid_around_models(glm::ivec3(24, 23, 27));
     std::uint32_t seed = 0;
