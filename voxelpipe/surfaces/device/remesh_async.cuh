@@ -189,33 +189,30 @@ private:
     using bits_target = target<bit, blend::replace>;
     using bits_view = framebuffer_view<bits_target>;
     using solid_draw = draw<Mesh, VertexShader, constant_output<bool>>;
-
     // What extract_call calls when the cells are known.
     struct crossing_finder {
         const remesh_call& call;
         const std::uint32_t* primitives;
         void operator()(const core::passes::cell_list& cells, core::edge_crossing* crossings,
                         core::passes::bounded_surface* surface, cudaStream_t stream) const {
-            call.run(1, stop_without_solid{call.solid_room(), call.state_, surface}, stream);
+            call.run(1, stop_without_solid{{0, 0, call.room_, 0}, call.state_, surface}, stream);
             call.template cross<0>(cells, crossings, surface, stream);
             call.template cross<1>(cells, crossings, surface, stream);
             call.template cross<2>(cells, crossings, surface, stream);
         }
     };
-
     template <class F>
     static void run(std::uint64_t count, const F& f, cudaStream_t stream) {
         for_each(count, f, stage::coarse_raster, stream);
     }
     template <int Axis>
-    [[nodiscard]] core::passes::row_keys<Axis> rows() const {
+    [[nodiscard]] auto rows() const {
         return core::passes::row_keys<Axis>(samples_.extent);
     }
     template <int Axis>
     [[nodiscard]] std::size_t sort_bytes_of() const {
         return room_ < 2 ? 0 : sort_bytes<std::uint64_t>(room_, rows<Axis>().key_bits() + 1);
     }
-    [[nodiscard]] capacities solid_room() const { return {0, 0, room_, 0}; }
     // bits: null for the size of its memory.
     [[nodiscard]] auto solid(word* bits) const {
         bits_view view = bits_view::on(samples_.extent, bits);
@@ -391,13 +388,12 @@ template <class Mesh, class VertexShader, class Shader>
     remesh_limits wanted = workspace.limits;
     wanted.crossings = std::max<std::uint64_t>({wanted.crossings, larger.fragments, state.all_crossings});
     const status of_surface = device::surface_status(state.surface, workspace.limits.surface, &wanted.surface);
-    if (s.ok() && state.all_crossings > workspace.limits.crossings)
-        s = core::failure(status_code::capacity_exceeded, stage::coarse_raster);
+    const bool lacks_crossings = state.all_crossings > workspace.limits.crossings;
+    if (s.ok() && lacks_crossings) s = core::failure(status_code::capacity_exceeded, stage::coarse_raster);
     if (s.ok() && !of_surface.ok()) s = of_surface;
     if (need != nullptr && s.code == status_code::capacity_exceeded) *need = wanted;
     if (!s.ok()) return s;
     s.surface = of_surface.surface;
-    s.surface.cone_crossings = 0; // nothing is repaired
     return s;
 }
 
