@@ -32,7 +32,7 @@ if [[ ! -e $prefix/complete ]]; then
     fetch_sources "$folder" zlib libdeflate libwebp meshoptimizer
     # Headers, and the sources of GoogleTest. The libraries beside them are of this machine.
     scripts/stage_deps.sh "$prefix" >/dev/null
-    rm -rf "$prefix/lib" "$prefix/share/cmake/benchmark"
+    rm -rf "${prefix:?}/lib" "$prefix/share/cmake/benchmark"
     log=$folder/libraries.log
     { cmake -S packaging/wheels -B "$folder/build" -DCMAKE_BUILD_TYPE=Release -DSOURCES="$folder/src" -DWITH_DRACO=OFF -DWITH_ZSTD=OFF \
         -DCMAKE_TOOLCHAIN_FILE="$root/cmake/toolchains/x86_64-w64-mingw32.cmake" -DCMAKE_INSTALL_PREFIX="$prefix" \

@@ -58,7 +58,7 @@ OBJ
 printf 'newmtl deep red\nKd 0.5 0 0\nnewmtl green\nKd 0 1 0\n' >model.mtl
 mkdir crlf
 for file in model.obj model.mtl; do sed 's/$/\r/' $file >crlf/$file; done
-colors=(-r 16 -t occupancy,color)
+colors=(-r 16 -t "occupancy,color")
 
 run 0 model.obj -o plain.npz "${colors[@]}"
 says out.txt "wrote plain.npz"
