@@ -8,6 +8,7 @@
 #   make docs                                     the site, in build/docs/html
 #   make dist                                     the source archive, in build/dist
 #   make wheels                                   wheels of the Python package that need no compiler, in build/wheels/dist
+#   make windows                                  the tool for Windows, build/windows/tool/voxelize.exe
 #   make page                                     a page that converts models in the browser, build/page/voxelize.html
 #   make blender                                  the Blender add-on with those wheels, in build/blender
 #   make release                                  all that a release holds, in build/release
@@ -18,7 +19,7 @@
 MODEL ?=
 RESOLUTION ?= 256
 
-.PHONY: demo test docs dist wheels page blender release bench bench-gpu bench-scaling bench-tune clean
+.PHONY: demo test docs dist wheels windows page blender release bench bench-gpu bench-scaling bench-tune clean
 .DEFAULT_GOAL := demo
 
 demo:
@@ -35,6 +36,9 @@ dist:
 
 wheels:
 	@scripts/wheels.sh
+
+windows:
+	@scripts/windows.sh
 
 page:
 	@scripts/page.sh

@@ -6,6 +6,7 @@
 #   voxelpipe-VERSION.tar.gz                       the source archive (scripts/dist.sh --test)
 #   *.whl, wheels-ARCH.txt                         wheels and what their tests said (scripts/wheels.sh)
 #   voxelize-VERSION-linux-ARCH.tar.gz             the tool, as those wheels bring it, with its licences
+#   voxelize-VERSION-windows-x86_64.zip            the tool for Windows, with its licences (scripts/windows.sh --check)
 #   voxelize-VERSION.html                          the page that converts models in the browser (scripts/page.sh --check)
 #   voxelpipe-blender-VERSION.zip                  the Blender add-on with these wheels (scripts/blender.sh)
 #   voxelpipe-VERSION-site.tar.gz                  the site (scripts/docs.sh --check)
@@ -17,10 +18,10 @@
 #   scripts/release.sh [--repository URL] [--draft] [PART...]
 #       --repository: where the archive will lie, for recipes and the site's links; without it there are no recipes
 #       --draft: of files that differ from the commit, or of a version without a tag
-#       PART: archive, wheels, arm, tool, page, blender, site, recipes or notes; all by default, those before left as they are
+#       PART: archive, wheels, arm, tool, windows, page, blender, site, recipes or notes; all by default, those before left as they are
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
-all=(archive wheels arm tool page blender site recipes notes)
+all=(archive wheels arm tool windows page blender site recipes notes)
 repository='' draft=0 parts=()
 while [[ $# -gt 0 ]]; do
     case $1 in
@@ -83,6 +84,25 @@ make_tool() {
     done
     rm -rf "$folder/work"
     [[ $made -eq 1 ]] || die "no wheel to take the tool from: scripts/release.sh wheels"
+}
+make_windows() {
+    local packed=voxelize-$version-windows-x86_64 licenses file
+    scripts/windows.sh --check --release
+    rm -rf "$folder/work" "$folder/$packed.zip"
+    licenses=$folder/work/$packed/licenses
+    mkdir -p "$licenses"
+    cp build/windows/tool/voxelize.exe docs/tool.md LICENSE "$folder/work/$packed/"
+    # Of all that is linked into it, and of the compiler's own libraries.
+    for file in build/windows_libraries/src/*/debian/copyright; do
+        cp "$file" "$licenses/$(basename "${file%/debian/copyright}").txt"
+    done
+    for file in libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev mingw-w64-x86-64-dev gcc-mingw-w64-x86-64-posix-runtime; do
+        cp -L "/usr/share/doc/$file/copyright" "$licenses/$file.txt"
+    done
+    x86_64-w64-mingw32-strip "$folder/work/$packed/voxelize.exe"
+    find "$folder/work/$packed" -exec touch -h -d "@$(git show -s --format=%ct HEAD)" {} +
+    (cd "$folder/work" && find "$packed" -type f | LC_ALL=C sort | TZ=UTC zip -q -X "$folder/$packed.zip" -@)
+    rm -rf "$folder/work"
 }
 make_page() {
     scripts/page.sh --check

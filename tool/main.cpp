@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 // voxelize INPUT.glb -o OUT... [options]: turns a glTF model into voxels. See --help.
-#include "model/exit_code.hpp"
 #include "model/memory.hpp"
 #include "model/model_error.hpp"
+#include "model/system.hpp"
 #include "run/batch.hpp"
 #include "run/command_line.hpp"
 #include "run/output_check.hpp"
@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <csignal>
 #include <iostream>
 
 namespace voxelize {
@@ -84,8 +83,7 @@ int run_main(int argc, char** argv) {
             return fail(exit_output, error.what());
         }
     }
-    // A reader that goes away is a failed write, and not the end of this process.
-    if (writes_standard_output(options)) std::signal(SIGPIPE, SIG_IGN);
+    if (writes_standard_output(options)) os::keep_running_without_reader();
     memory::set_limit(options.max_memory, options.max_memory != 0);
     const run_outcome result = run_model(options, begin);
     if (result.code == exit_ok) {
@@ -100,6 +98,6 @@ int run_main(int argc, char** argv) {
 } // namespace voxelize
 
 int main(int argc, char** argv) {
-    std::signal(SIGXFSZ, SIG_IGN); // a file beyond the limit of the shell fails like one on a full disk
+    voxelize::os::begin_program(argc, argv);
     return voxelize::run_main(argc, argv);
 }

@@ -7,7 +7,6 @@
 #include "renderer.hpp"
 #include "window.hpp"
 
-#include "model/exit_code.hpp"
 #include "model/model_error.hpp"
 #include "run/report.hpp"
 #include "write/formats/output_file.hpp"

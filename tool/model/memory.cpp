@@ -2,17 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "memory.hpp"
 
-#if !defined(__wasi__)
-#include <malloc.h>
-#include <sys/resource.h>
-#include <unistd.h>
-#endif
+#include "system.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstdio>
-#include <fstream>
 #include <string>
 #include <string_view>
 
@@ -29,41 +23,18 @@ std::atomic<double> expected{0};                // bytes in all that the run was
 std::uint64_t limit_bytes = UINT64_MAX;
 bool limit_is_option = false;
 
-// Bytes in physical memory.
-struct residence {
-    std::uint64_t all = 0, of_files = 0; // of_files: code and mapped files
-};
-
 #if defined(__wasi__)
 // WebAssembly's memory grows and never shrinks: what it holds is not what is taken. Data and the stack lie below the
 // heap. Of the heap only counted blocks are known.
 extern "C" const char __heap_base;
-residence residence_now() noexcept {
+os::residence residence_now() noexcept {
     const std::uint64_t below_heap = reinterpret_cast<std::uintptr_t>(&__heap_base);
     return {below_heap + counted, 0};
 }
 std::uint64_t heap_bytes() noexcept { return 0; }
 #else
-// Takes no counted block: it is called within operator new.
-residence residence_now() noexcept {
-    std::FILE* const file = std::fopen("/proc/self/statm", "r");
-    if (file == nullptr) return {};
-    unsigned long long all = 0, pages = 0, shared = 0;
-    const bool read = std::fscanf(file, "%llu %llu %llu", &all, &pages, &shared) == 3;
-    std::fclose(file);
-    const auto page = static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
-    return read ? residence{pages * page, shared * page} : residence{};
-}
-
-// Bytes of malloc's heaps, where the blocks lie that are not counted, and where their memory stays once they are given
-// back.
-std::uint64_t heap_bytes() noexcept {
-#if defined(__GLIBC__) && !__GLIBC_PREREQ(2, 33)
-    return static_cast<unsigned>(mallinfo().arena); // of 32 bits: the heaps' bytes modulo 2^32
-#else
-    return mallinfo2().arena;
-#endif
-}
+using os::heap_bytes;
+using os::residence_now;
 #endif
 
 std::uint64_t difference(std::uint64_t a, std::uint64_t b) { return a > b ? a - b : 0; }
@@ -73,26 +44,17 @@ std::uint64_t difference(std::uint64_t a, std::uint64_t b) { return a > b ? a - 
 // hide as much of the rest.
 void measure_overhead() noexcept {
     static const std::uint64_t data_of_libraries = [] {
-        const residence at_first = residence_now();
+        const os::residence at_first = residence_now();
         return difference(at_first.all, at_first.of_files + heap_bytes() + counted);
     }();
     unmeasured = 0;
-    const residence now = residence_now();
+    const os::residence now = residence_now();
     const std::uint64_t rest = std::max(difference(now.all, counted), now.of_files + data_of_libraries + heap_bytes());
     // What comes between two looks.
     constexpr std::uint64_t reserve = std::uint64_t{512} << 10;
     overhead = rest + reserve;
     if (limit_bytes != UINT64_MAX) allowed = difference(limit_bytes, rest + reserve);
 }
-
-#if !defined(__wasi__)
-// The number in FILE; the greatest number if FILE holds none ("max").
-std::uint64_t number_in(const std::string& file) {
-    std::ifstream stream(file);
-    std::uint64_t number = 0;
-    return stream >> number ? number : UINT64_MAX;
-}
-#endif
 
 std::string limit_text() {
     return mebibytes(static_cast<double>(limit_bytes)) +
@@ -117,25 +79,8 @@ std::uint64_t machine_limit() {
 }
 #else
 std::uint64_t machine_limit() {
-    std::uint64_t least =
-        static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
-    // Control groups: version 2 by the path of this process and those above it, version 1 where containers see it.
-    std::ifstream groups("/proc/self/cgroup");
-    for (std::string line; std::getline(groups, line);) {
-        if (!line.starts_with("0::")) continue;
-        for (std::string path = line.substr(3);; path.erase(path.find_last_of('/'))) {
-            if (path == "/") path.clear();
-            least = std::min(least, number_in("/sys/fs/cgroup" + path + "/memory.max"));
-            if (path.find('/') == std::string::npos) break;
-        }
-    }
-    least = std::min(least, number_in("/sys/fs/cgroup/memory/memory.limit_in_bytes"));
-    for (const auto resource : {RLIMIT_AS, RLIMIT_DATA}) {
-        rlimit own{};
-        if (getrlimit(resource, &own) == 0 && own.rlim_cur != RLIM_INFINITY)
-            least = std::min(least, static_cast<std::uint64_t>(own.rlim_cur));
-    }
-    return least - least / 10;
+    const std::uint64_t allowed = os::allowed_memory();
+    return allowed - allowed / 10;
 }
 #endif
 
@@ -152,14 +97,7 @@ std::uint64_t resident() { return residence_now().all; }
 #if defined(__wasi__)
 std::uint64_t peak() { return std::uint64_t{__builtin_wasm_memory_size(0)} * 65536; }
 #else
-std::uint64_t peak() {
-    std::ifstream status("/proc/self/status");
-    for (std::string line; std::getline(status, line);)
-        if (line.starts_with("VmHWM:")) return std::stoull(line.substr(6)) * 1024;
-    rusage usage{}; // which counts what the process was before it began this program, too
-    getrusage(RUSAGE_SELF, &usage);
-    return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
-}
+std::uint64_t peak() { return os::most_resident(); }
 #endif
 
 std::uint64_t room() {

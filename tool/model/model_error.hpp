@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Errors of models that cannot be used and of files that cannot be written, whatever their format.
+// Errors of models that cannot be used and of files that cannot be written, whatever their format; the exit codes of
+// the program.
 
 #include <filesystem>
 #include <new>
@@ -11,6 +12,17 @@
 #include <vector>
 
 namespace voxelize {
+
+// As --help prints them.
+enum exit_code : int {
+    exit_ok = 0,
+    exit_usage = 1,     // the command line makes no sense
+    exit_input = 2,     // the model or the list cannot be read, or there is nothing to voxelize
+    exit_too_large = 3, // the work does not fit into memory, or with --backend cuda into the GPU's
+    exit_output = 4,    // an output file cannot be written
+    exit_backend = 5,   // the backend is not built in, or has no driver, device or code for the device
+    exit_internal = 70  // a bug of this program
+};
 
 // One line without control characters, for a person.
 struct model_error : std::runtime_error {

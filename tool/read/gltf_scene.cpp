@@ -7,7 +7,6 @@
 #include "read/gltf/budget.hpp"
 #include "read/gltf/check.hpp"
 #include "read/gltf/container.hpp"
-#include "read/gltf/mapped_file.hpp"
 #include "read/gltf/materials.hpp"
 #include "read/gltf/nodes.hpp"
 #include "read/gltf/parse.hpp"

@@ -3,7 +3,7 @@
 #include "gltf_stream.hpp"
 
 #include "read/assimp/file_name.hpp"
-#include "read/gltf/mapped_file.hpp"
+#include "read/gltf/resources.hpp"
 
 #include <algorithm>
 #include <cstring>

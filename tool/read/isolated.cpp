@@ -7,12 +7,13 @@
 #include <new>
 #include <span>
 
-#if defined(__wasi__)
+#if defined(__wasi__) || defined(_WIN32)
 
 namespace voxelize {
 
-// WASI has one process. What would end another one ends this one, and the page starts it anew for each model: it is the
-// boundary there, so the time and the memory of the work have no limit of their own.
+// WASI has one process, and Windows cannot double one. What would end another process ends this one, which is the
+// boundary there: the time and the memory of the work have no limit of their own. The page starts a process for each
+// model. The tool for Windows is built without the libraries that need the boundary.
 std::vector<std::byte> run_isolated(const std::function<std::vector<std::byte>()>& work, const isolation_limits& limits,
                                     const std::string& who) {
     std::vector<std::byte> bytes;

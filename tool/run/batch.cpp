@@ -3,9 +3,10 @@
 #include "batch.hpp"
 
 #include "batch_manifest.hpp"
-#include "model/exit_code.hpp"
+#include "batch_workers.hpp"
 #include "model/memory.hpp"
 #include "model/model_error.hpp"
+#include "model/system.hpp"
 #include "output_check.hpp"
 #include "read/named_files.hpp"
 #include "run_model.hpp"
@@ -14,12 +15,6 @@
 
 #include <nlohmann/json.hpp>
 #include <zlib.h>
-
-#include <fcntl.h>
-#include <poll.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -105,10 +100,8 @@ json record_of(const listed_model& model, const std::string& work) {
     return {{"input", model.input.string()}, {"name", model.name}, {"work", work}};
 }
 
-// In the process of a model: does the work, sends the record through OUT.
-[[noreturn]] void run_child(const command_line& all, const listed_model& model, const std::string& work,
-                            output_check* known, int out) {
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
+// In the process of a model: does the work.
+work_done work_on(const command_line& all, const listed_model& model, const std::string& work, output_check* known) {
     const auto begin = clock::now();
     command_line options = all;
     options.input = model.input;
@@ -152,78 +145,18 @@ json record_of(const listed_model& model, const std::string& work) {
     }
     if (!result.report.warnings.empty()) record["warnings"] = result.report.warnings;
     record["ms"] = std::chrono::duration<double, std::milli>(clock::now() - begin).count();
-    const std::string text = record.dump(-1, ' ', false, json::error_handler_t::replace);
-    for (std::size_t at = 0; at < text.size();) {
-        const ssize_t n = ::write(out, text.data() + at, text.size() - at);
-        if (n < 0 && errno != EINTR) break;
-        at += n > 0 ? static_cast<std::size_t>(n) : 0;
-    }
-    _exit(result.code);
+    return {record.dump(-1, ' ', false, json::error_handler_t::replace), result.code};
 }
 
-// The processes of models.
-class workers {
-public:
-    // known: what all models read and write, as run_model() takes it.
-    explicit workers(output_check* known) : known_(known) {}
-
-    struct job {
-        listed_model model;
-        std::string work;
-        pid_t process;
-        int from;
-        std::string text;
-    };
-    void start(const command_line& options, listed_model model, std::string work) {
-        int ends[2];
-        if (pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error(std::string("no pipe: ") + std::strerror(errno));
-        std::cout.flush();
-        const pid_t process = fork();
-        if (process < 0) throw std::runtime_error(std::string("no further process: ") + std::strerror(errno));
-        if (process == 0) {
-            close(ends[0]);
-            run_child(options, model, work, known_, ends[1]);
-        }
-        close(ends[1]);
-        jobs_.push_back({std::move(model), std::move(work), process, ends[0], {}});
-    }
-    [[nodiscard]] std::size_t size() const { return jobs_.size(); }
-
-    // Waits until a process ends, and calls done(job, its record).
-    template <class Done>
-    void wait(const Done& done) {
-        std::vector<pollfd> files;
-        for (const job& j : jobs_) files.push_back({j.from, POLLIN, 0});
-        if (poll(files.data(), files.size(), -1) < 0 && errno != EINTR)
-            throw std::runtime_error(std::string("poll: ") + std::strerror(errno));
-        for (std::size_t i = files.size(); i-- > 0;) {
-            if (files[i].revents == 0) continue;
-            std::array<char, 65536> block;
-            const ssize_t n = read(files[i].fd, block.data(), block.size());
-            if (n > 0) jobs_[i].text.append(block.data(), static_cast<std::size_t>(n));
-            if (n > 0 || (n < 0 && errno == EINTR)) continue;
-            job ended = std::move(jobs_[i]);
-            jobs_.erase(jobs_.begin() + static_cast<std::ptrdiff_t>(i));
-            close(ended.from);
-            int status = 0;
-            while (waitpid(ended.process, &status, 0) < 0 && errno == EINTR) {
-            }
-            json record = json::parse(ended.text, nullptr, false);
-            if (!record.is_object()) {
-                record = record_of(ended.model, ended.work);
-                record["status"] = "crashed";
-                record["error"] = WIFSIGNALED(status)
-                                      ? "ended by signal " + std::to_string(WTERMSIG(status))
-                                      : "ended without a word, code " + std::to_string(WEXITSTATUS(status));
-            }
-            done(ended, record);
-        }
-    }
-
-private:
-    output_check* known_;
-    std::vector<job> jobs_;
-};
+// The order for the process of a model, where that is this program once more: the model, and all models where their
+// files have to be compared.
+json order_of(const listed_model& model, const std::string& work, const std::vector<listed_model>* all) {
+    json order = record_of(model, work);
+    if (all == nullptr) return order;
+    order["all"] = json::array();
+    for (const listed_model& each : *all) order["all"].push_back({each.input.string(), each.name});
+    return order;
+}
 
 // The models of the list FILE, "-" for standard input. Throws model_error, which names the list and the reason.
 std::vector<listed_model> models_of(const fs::path& file) {
@@ -297,6 +230,33 @@ output_check check_list(const command_line& options, const std::vector<listed_mo
         for (const listed_model& model : models)
             for (const fs::path& file : named_files(model.input)) check.add_named(file, model.input);
     return check;
+}
+
+// True where names that only the grid of a model tells, of meshes in several files, are compared once it is known.
+bool may_split(const command_line& options) {
+    return std::any_of(options.outputs.begin(), options.outputs.end(), [](const fs::path& output) {
+        const std::string extension = lower_extension(output);
+        return extension == ".obj" || extension == ".ply" || extension == ".glb" || extension == ".stl";
+    });
+}
+
+fs::path manifest_of(const command_line& options, const fs::path& folder) {
+    return folder / ("manifest." + std::to_string(options.batch.rank) + ".jsonl");
+}
+
+// In a process that has an order: does the work of it, and prints the record.
+int follow(const std::string& text, const command_line& options) {
+    const json order = json::parse(text);
+    std::vector<listed_model> all;
+    if (order.contains("all"))
+        for (const json& each : order["all"]) all.push_back({each.at(0).get<std::string>(), each.at(1)});
+    std::optional<output_check> known;
+    const fs::path folder = manifest_folder(options.outputs.front());
+    if (!all.empty()) known = check_list(options, all, folder, manifest_of(options, folder), finished_models(folder));
+    const auto [record, code] = work_on(options, {order.at("input").get<std::string>(), order.at("name")},
+                                        order.at("work"), known ? &*known : nullptr);
+    std::cout << record << std::flush;
+    return code;
 }
 
 } // namespace
@@ -377,35 +337,41 @@ fs::path manifest_folder(const fs::path& output) {
 }
 
 int run_batch(const command_line& options) {
+    if (const std::optional<std::string> order = os::worker_order()) return follow(*order, options);
     const std::vector<listed_model> models = models_of(options.batch.list);
     const fs::path folder = manifest_folder(options.outputs.front());
-    const fs::path own_manifest = folder / ("manifest." + std::to_string(options.batch.rank) + ".jsonl");
+    const fs::path own_manifest = manifest_of(options, folder);
     const finished_models finished(folder);
     std::optional<output_check> known = check_list(options, models, folder, own_manifest, finished);
-    // Names that only the grid of a model tells, of meshes in several files, are compared once it is known.
-    const bool may_split = std::any_of(options.outputs.begin(), options.outputs.end(), [](const fs::path& output) {
-        const std::string extension = lower_extension(output);
-        return extension == ".obj" || extension == ".ply" || extension == ".glb" || extension == ".stl";
-    });
-    if (!may_split) known.reset();
+    if (!may_split(options)) known.reset();
     const manifest records(own_manifest);
 
     std::size_t mine = 0, skipped = 0, done = 0, failed = 0;
-    workers running(known ? &*known : nullptr);
+    workers running([&](const listed_model& model,
+                        const std::string& work) { return work_on(options, model, work, known ? &*known : nullptr); },
+                    [&](const listed_model& model, const std::string& work) {
+                        return order_of(model, work, known ? &models : nullptr).dump();
+                    });
     const auto wait = [&] {
-        running.wait([&](const workers::job& job, const json& record) {
+        for (const workers::ended& end : running.wait()) {
+            json record = json::parse(end.record, nullptr, false);
+            if (!record.is_object()) {
+                record = record_of(end.model, end.work);
+                record["status"] = "crashed";
+                record["error"] = end.how;
+            }
             records.add(record);
             const std::string status = record.value("status", "");
             ++done;
             if (status != "ok") {
                 ++failed;
-                std::cerr << "voxelize: " << job.model.input.string() << ": " << status << ": "
+                std::cerr << "voxelize: " << end.model.input.string() << ": " << status << ": "
                           << record.value("error", "") << '\n';
             } else if (!options.quiet) {
-                std::cout << job.model.name << ": " << record["counts"]["voxels"] << " voxels, "
+                std::cout << end.model.name << ": " << record["counts"]["voxels"] << " voxels, "
                           << static_cast<long long>(record["ms"].get<double>()) << " ms\n";
             }
-        });
+        }
     };
     for (std::size_t i = 0; i < models.size(); ++i) {
         if (i % static_cast<std::size_t>(options.batch.world_size) != static_cast<std::size_t>(options.batch.rank))
@@ -417,7 +383,7 @@ int run_batch(const command_line& options) {
             continue;
         }
         while (running.size() >= static_cast<std::size_t>(options.batch.jobs)) wait();
-        running.start(options, models[i], std::move(work));
+        running.start(models[i], std::move(work));
     }
     while (running.size() != 0) wait();
     // The same whoever writes it: it names the pages of every rank.

@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "batch_manifest.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
+#include "model/system.hpp"
 
 #include <algorithm>
 #include <array>
@@ -27,8 +26,7 @@ std::string now() {
     const auto since = std::chrono::system_clock::now().time_since_epoch();
     const auto micros = std::chrono::duration_cast<std::chrono::microseconds>(since).count();
     const auto seconds = static_cast<std::time_t>(micros / 1000000);
-    std::tm utc{};
-    gmtime_r(&seconds, &utc);
+    const std::tm utc = os::utc(seconds);
     std::array<char, 32> date{}, text{};
     std::strftime(date.data(), date.size(), "%Y-%m-%dT%H:%M:%S", &utc);
     std::snprintf(text.data(), text.size(), "%.19s.%06dZ", date.data(), static_cast<int>(micros % 1000000));
@@ -39,14 +37,12 @@ std::string now() {
 
 manifest::manifest(const fs::path& path) : path_(path) {
     if (path.has_parent_path()) fs::create_directories(path.parent_path());
-    file_ = open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    file_ = os::open_file(path, os::opening::append_shared);
     if (file_ < 0) fail("open");
-    char last = '\n';
-    const off_t size = lseek(file_, 0, SEEK_END);
-    if (size > 0 && pread(file_, &last, 1, size - 1) == 1 && last != '\n') add_text("\n");
+    if (os::last_byte(file_).value_or('\n') != '\n') add_text("\n");
 }
 
-manifest::~manifest() { close(file_); }
+manifest::~manifest() { os::close_file(file_); }
 
 void manifest::add(json record) const {
     record["time"] = now();
@@ -54,7 +50,7 @@ void manifest::add(json record) const {
 }
 
 void manifest::add_text(const std::string& text) const {
-    if (::write(file_, text.data(), text.size()) != static_cast<ssize_t>(text.size())) fail("write");
+    if (!os::write_once(file_, text)) fail("write");
 }
 
 void manifest::fail(const char* action) const {

@@ -2,9 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "output_check.hpp"
 
+#include "model/system.hpp"
 #include "read/assimp/file_name.hpp"
-
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
@@ -60,22 +59,21 @@ output_check::output_check(std::span<const fs::path> outputs)
       })) {}
 
 std::optional<output_check::identity> output_check::identify(const fs::path& path) {
-    struct stat found {};
-    const auto numbers = [&found](std::string rest) {
-        return identity{static_cast<std::uint64_t>(found.st_dev), static_cast<std::uint64_t>(found.st_ino),
-                        std::move(rest)};
+    const auto numbers = [](const os::file_facts& found, const fs::path& rest) {
+        return identity{found.id.device, found.id.file, os::compared_name(rest)};
     };
-    if (::stat(path.c_str(), &found) == 0) {
-        if (!S_ISREG(found.st_mode) && !S_ISDIR(found.st_mode)) return std::nullopt;
-        return numbers({});
+    if (const auto found = os::facts_of(path)) {
+        if (found->kind == os::file_kind::other) return std::nullopt;
+        return numbers(*found, {});
     }
     std::error_code error;
     fs::path missing = path;
-    if (::stat(folder_around(missing).c_str(), &found) == 0) return numbers(missing.filename().string());
+    if (const auto found = os::facts_of(folder_around(missing))) return numbers(*found, missing.filename());
     missing = fs::absolute(missing, error).lexically_normal();
     fs::path rest = missing.filename();
     for (fs::path folder = missing.parent_path();; folder = folder.parent_path()) {
-        if (::stat(folder.c_str(), &found) == 0 || folder == folder.parent_path()) return numbers(rest.string());
+        const auto found = os::facts_of(folder);
+        if (found || folder == folder.parent_path()) return numbers(found.value_or(os::file_facts{}), rest);
         rest = folder.filename() / rest;
     }
 }
@@ -119,7 +117,7 @@ void output_check::add(const fs::path& file, std::size_t by, bool is_known) {
     const auto [known, is_new] = files_.try_emplace(*id, by);
     if (!is_new) check_pair(known->second, by, file, is_known);
     if (replaces_folders_) add_to_folders(file, *id, by);
-    const std::optional<numbered_name> name = split_number(file.filename().string());
+    const std::optional<numbered_name> name = split_number(os::compared_name(file.filename()));
     if (!name) return;
     const std::optional<identity>& folder = identify_folder(folder_around(file));
     if (!folder) return;
@@ -144,15 +142,14 @@ void output_check::add_to_folders(const fs::path& file, const identity& id, std:
 void output_check::add_numbered(const numbered_names& names, std::size_t by, bool is_known) {
     const fs::path where = names.folder.empty() ? fs::path(".") : names.folder;
     if (const std::optional<identity>& folder = identify_folder(where)) {
-        const pattern with{*folder, names.prefix, names.suffix};
+        const pattern with{*folder, os::compared_name(names.prefix), os::compared_name(names.suffix)};
         with_numbers_[with].push_back({names.count, by});
         if (const auto found = with_number_.find(with); found != with_number_.end())
             for (const numbered_user& other : found->second)
                 if (other.number <= names.count) check_pair(other.by, by, names.name(other.number), is_known);
     }
     for (std::uint64_t n = 1; n <= std::min(names.count, most_looked_at); ++n) {
-        struct stat found {};
-        if (::lstat(names.name(n).c_str(), &found) != 0) break;
+        if (!os::facts_of(names.name(n), os::links::keep)) break;
         const std::optional<identity> id = identify(names.name(n));
         if (const auto known = id ? files_.find(*id) : files_.end(); known != files_.end())
             check_pair(known->second, by, names.name(n), is_known);

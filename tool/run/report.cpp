@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "report.hpp"
 
-#include <nlohmann/json.hpp>
+#include "model/system.hpp"
 
-#include <unistd.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cstdio>
@@ -15,7 +15,7 @@
 
 namespace voxelize {
 
-progress_bar::progress_bar(bool enabled) : enabled_{enabled && isatty(STDERR_FILENO) != 0} {}
+progress_bar::progress_bar(bool enabled) : enabled_{enabled && os::draws_over_lines(2)} {}
 
 void progress_bar::start(std::string what) {
     clear();

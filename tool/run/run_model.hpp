@@ -4,7 +4,7 @@
 // One model, from its file to the outputs.
 
 #include "command_line.hpp"
-#include "model/exit_code.hpp"
+#include "model/model_error.hpp"
 #include "report.hpp"
 
 #include <chrono>

@@ -6,15 +6,11 @@
 #include "draw/pass_files.hpp"
 #include "draw/sparse/loaded_slabs.hpp"
 #include "model/memory.hpp"
+#include "model/system.hpp"
 #include "slab_output.hpp"
 #include "write/formats/output_file.hpp"
 
 #include <nlohmann/json.hpp>
-
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -50,29 +46,34 @@ public:
     explicit folder_lock(const fs::path& folder, const std::string& name = "lock",
                          const std::function<void()>& say = {}) {
         const fs::path path = folder / name;
-        file_ = ::open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
+        file_ = os::open_file(path, os::opening::share);
         int error = file_ < 0 ? errno : 0;
-        if (error == 0 && say && ::flock(file_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) say();
-        while (error == 0 && ::flock(file_, LOCK_EX) != 0)
-            if (errno != EINTR) error = errno;
+        bool is_locked = error == 0 && say && os::lock_file(file_, false);
+        if (error == 0 && !is_locked && say && errno == EWOULDBLOCK) say();
+        if (error == 0 && !is_locked && !os::lock_file(file_, true)) error = errno;
         // Who had the lock before may have removed the folder.
-        struct stat mine {
-        }, there{};
-        has_ = error == 0 && ::fstat(file_, &mine) == 0 && ::stat(path.c_str(), &there) == 0 &&
-               mine.st_ino == there.st_ino && mine.st_dev == there.st_dev;
-        if (error == 0 || error == ENOENT || error == ESTALE) return;
-        if (file_ >= 0) ::close(file_);
+        if (error == 0) {
+            const auto mine = os::facts_of(file_), there = os::facts_of(path);
+            has_ = mine && there && mine->id == there->id;
+        }
+        if (error == 0 || error == ENOENT || error == stale_file) return;
+        if (file_ >= 0) os::close_file(file_);
         throw write_error(path, "lock: " + std::generic_category().message(error));
     }
     folder_lock(const folder_lock&) = delete;
     folder_lock& operator=(const folder_lock&) = delete;
     ~folder_lock() {
-        if (file_ >= 0) ::close(file_);
+        if (file_ >= 0) os::close_file(file_);
     }
     // False if the folder is gone.
     explicit operator bool() const { return has_; }
 
 private:
+#if defined(ESTALE)
+    static constexpr int stale_file = ESTALE; // as NFS has it
+#else
+    static constexpr int stale_file = ENOENT;
+#endif
     int file_;
     bool has_ = false;
 };

@@ -19,6 +19,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <filesystem>
 #include <mutex>
 #else
 #include <fcntl.h>
@@ -40,14 +41,15 @@ public:
     temporary_file& operator=(const temporary_file&) = delete;
 
 #if defined(_WIN32)
-    // folder: where the file is made.
+    // folder: where the file is made, as std::filesystem::path takes it.
     explicit temporary_file(const std::string& folder) {
         static std::atomic<unsigned> number{0};
         do {
             const std::string name =
                 folder + "/voxelpipe-" + std::to_string(::_getpid()) + '-' + std::to_string(number.fetch_add(1));
-            file_ = ::_open(name.c_str(), _O_CREAT | _O_EXCL | _O_RDWR | _O_BINARY | _O_TEMPORARY | _O_NOINHERIT,
-                            _S_IREAD | _S_IWRITE);
+            file_ =
+                ::_wopen(std::filesystem::path(name).c_str(),
+                         _O_CREAT | _O_EXCL | _O_RDWR | _O_BINARY | _O_TEMPORARY | _O_NOINHERIT, _S_IREAD | _S_IWRITE);
         } while (file_ < 0 && errno == EEXIST);
         if (file_ < 0) fail_temporary_file(errno, "cannot make a temporary file in " + folder);
     }

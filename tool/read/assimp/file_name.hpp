@@ -19,7 +19,7 @@ namespace voxelize::assimp {
     std::replace(file.begin(), file.end(), '\\', '/');
     std::filesystem::path path = std::filesystem::path(file).lexically_normal();
     const bool has_drive = file.size() > 1 && file[1] == ':';
-    if (path.is_absolute() || has_drive || (!path.empty() && *path.begin() == "..")) path = path.filename();
+    if (path.has_root_path() || has_drive || (!path.empty() && *path.begin() == "..")) path = path.filename();
     if (path.empty() || !path.has_filename() || path == "." || path == "..") return std::nullopt;
     return path;
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "resources.hpp"
 
+#include "model/system.hpp"
 #include "picture_file.hpp"
 #include "text.hpp"
 
@@ -62,7 +63,7 @@ std::filesystem::path local_path(const std::string& uri) {
     if (const std::size_t colon = text.find(':'); colon != std::string::npos && text.find('/') > colon)
         throw gltf_error("not a relative path");
     std::filesystem::path path = std::filesystem::path(text).lexically_normal();
-    if (path.is_absolute() || text.front() == '\\') throw gltf_error("not a relative path");
+    if (path.has_root_path() || text.front() == '\\') throw gltf_error("not a relative path");
     if (path.begin()->string() == "..") throw gltf_error("a path that leaves the folder of the file");
     return path;
 }
@@ -192,6 +193,17 @@ std::vector<std::byte> read_whole_file(const std::filesystem::path& file, std::u
                                                                : "it ends after " + std::to_string(stream.gcount()) +
                                                                      " of its " + std::to_string(size) + " bytes"));
     return bytes;
+}
+
+mapped_file::mapped_file(const std::filesystem::path& file, std::uint64_t max_bytes) {
+    size_ = checked_file_size(file, max_bytes);
+    if (size_ == 0) return;
+    data_ = os::map_file(file, size_);
+    if (data_ == nullptr) throw gltf_error("cannot be read: " + std::generic_category().message(errno));
+}
+
+mapped_file::~mapped_file() {
+    if (data_ != nullptr) os::unmap_file(data_, size_);
 }
 
 } // namespace voxelize::gltf

@@ -1,12 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #include "draw/distance/distance_voxelizer.hpp"
+#include "model/system.hpp"
 #include "raw_options.hpp"
 #include "values.hpp"
 #include "write/formats/blocks.hpp"
 #include "write/surface_files.hpp"
-
-#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
@@ -297,7 +296,7 @@ void understand_outputs(command_line& options, const raw_options& raw) {
             if (const std::string_view why = why_no_stream(*found); !why.empty())
                 throw usage_error("\"" + output.string() + "\": " + std::string(found->extension) +
                                   " cannot go to standard output: " + std::string(why));
-            if (isatty(STDOUT_FILENO) != 0)
+            if (os::is_terminal(1))
                 throw usage_error("\"" + output.string() + "\": standard output is a terminal; redirect it");
         }
         if (std::count(options.outputs.begin(), options.outputs.end(), output) > 1)

@@ -3,16 +3,13 @@
 
 #include "output_file.hpp"
 
+#include "model/system.hpp"
 #include "part.hpp"
-
-#include <fcntl.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
 #include <cstring>
-#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -23,16 +20,13 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t buffer_bytes = std::size_t{1} << 20;
 
-// The same open file again, or -1: its lock holds as long as one of both is open.
-int again(int file) { return ::fcntl(file, F_DUPFD_CLOEXEC, 0); }
-
 } // namespace
 
 output_file::output_file(const fs::path& target) : target_(target), real_(target) {
     std::error_code error;
     if (is_standard_output(target_)) {
-        const int file = again(STDOUT_FILENO);
-        file_ = file < 0 ? nullptr : ::fdopen(file, "wb");
+        const int file = os::open_again(1);
+        file_ = file < 0 ? nullptr : os::write_stream(file);
         if (file_ == nullptr) fail("open", errno);
         std::setvbuf(file_, nullptr, _IOFBF, buffer_bytes);
         return;
@@ -44,13 +38,13 @@ output_file::output_file(const fs::path& target) : target_(target), real_(target
     const fs::file_status status = fs::status(real_, error);
     if (fs::is_directory(status)) fail("open", EISDIR);
     if (fs::exists(status) && !fs::is_regular_file(status)) {
-        file_ = std::fopen(real_.c_str(), "wb");
+        file_ = os::write_stream(real_);
         if (file_ == nullptr) fail("open", errno);
     } else {
         try {
             locked_part part = open_part_file(real_);
             temporary_ = part.path();
-            file_ = ::fdopen(part.file(), "wb");
+            file_ = os::write_stream(part.file());
             if (file_ != nullptr) (void)part.take_file();
         } catch (const std::system_error& failure) {
             fail("open", failure.code().value());
@@ -70,7 +64,7 @@ output_file::~output_file() {
         fs::remove(temporary_, ignored);
     }
     if (file_ != nullptr) std::fclose(file_);
-    if (lock_ >= 0) ::close(lock_);
+    if (lock_ >= 0) os::close_file(lock_);
 }
 
 void output_file::fail(std::string_view action, int error) const {
@@ -84,14 +78,13 @@ void output_file::write(std::span<const std::byte> bytes) {
 }
 
 void output_file::seek(std::uint64_t at) {
-    if (at > static_cast<std::uint64_t>(std::numeric_limits<long>::max())) fail("seek", EFBIG);
-    if (std::fseek(file_, static_cast<long>(at), SEEK_SET) != 0) fail("seek", errno);
+    if (!os::seek_stream(file_, at)) fail("seek", errno);
     at_ = at;
 }
 
 void output_file::close() {
     if (file_ == nullptr) return;
-    if (!temporary_.empty()) lock_ = again(::fileno(file_));
+    if (!temporary_.empty()) lock_ = os::open_again(os::descriptor_of(file_));
     std::FILE* closing = file_;
     file_ = nullptr;
     if (std::fclose(closing) != 0) fail("write", errno);
@@ -104,7 +97,7 @@ void output_file::commit() {
     fs::rename(temporary_, real_, error);
     if (error) fail("rename", error.value());
     temporary_.clear();
-    ::close(std::exchange(lock_, -1));
+    if (lock_ >= 0) os::close_file(std::exchange(lock_, -1));
 }
 
 std::vector<fs::path> commit_all(std::span<const std::unique_ptr<output_file>> files) {

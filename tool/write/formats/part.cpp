@@ -3,10 +3,7 @@
 
 #include "part.hpp"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
+#include "model/system.hpp"
 
 #include <cerrno>
 #include <string>
@@ -26,43 +23,38 @@ fs::path name_of_part(const fs::path& target, int n) {
 
 // True if the path still leads to the open file.
 bool is_at(const fs::path& path, int file) {
-    struct stat mine {
-    }, there{};
-    return ::fstat(file, &mine) == 0 && ::lstat(path.c_str(), &there) == 0 && mine.st_ino == there.st_ino &&
-           mine.st_dev == there.st_dev;
+    const auto mine = os::facts_of(file), there = os::facts_of(path, os::links::keep);
+    return mine && there && mine->id == there->id;
 }
-
-bool lock(int file) { return ::flock(file, LOCK_EX | LOCK_NB) == 0; }
 
 // A new file and its lock. A file system without locks gives the file alone. None if there is a file of this name,
 // which errno says to be EEXIST, or if another process was quicker to take it.
 locked_part create(const fs::path& path) {
-    const int file = ::open(path.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0666);
+    const int file = os::open_file(path, os::opening::create);
     if (file < 0) return {};
-    if ((lock(file) || errno != EWOULDBLOCK) && is_at(path, file)) return {path, file};
-    ::close(file);
+    if ((os::lock_file(file, false) || errno != EWOULDBLOCK) && is_at(path, file)) return {path, file};
+    os::close_file(file);
     errno = EEXIST;
     return {};
 }
 
 // The lock of a file that a process left which has ended: a regular file of this user, with this name alone.
 locked_part take(const fs::path& path) {
-    struct stat there {};
-    if (::lstat(path.c_str(), &there) != 0 || !S_ISREG(there.st_mode) || there.st_nlink != 1 ||
-        there.st_uid != ::geteuid())
-        return {};
-    const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW);
+    const auto there = os::facts_of(path, os::links::keep);
+    if (!there || there->kind != os::file_kind::regular || !there->is_only_name) return {};
+    const int file = os::open_file(path, os::opening::read_write);
     if (file < 0) return {};
-    if (lock(file) && is_at(path, file)) return {path, file};
-    ::close(file);
+    if (os::lock_file(file, false) && is_at(path, file)) return {path, file};
+    os::close_file(file);
     return {};
 }
 
 // Removes a folder that a killed run left. False if it is another's.
 bool remove_left_folder(const fs::path& path) {
-    if (::rmdir(path.c_str()) == 0) return true; // it ended before it made the lock
-    const locked_part left = take(path / part_folder_lock);
+    if (os::remove_empty_folder(path)) return true; // it ended before it made the lock
+    locked_part left = take(path / part_folder_lock);
     if (left.path().empty()) return false;
+    if constexpr (os::open_files_keep_folders) left.release();
     std::error_code error;
     fs::remove_all(path, error);
     return !error;
@@ -82,7 +74,7 @@ locked_part& locked_part::operator=(locked_part&& other) noexcept {
 }
 
 void locked_part::release() {
-    if (file_ >= 0) ::close(std::exchange(file_, -1));
+    if (file_ >= 0) os::close_file(std::exchange(file_, -1));
     path_.clear();
 }
 
@@ -93,11 +85,13 @@ locked_part open_part_file(const fs::path& target) {
         if (part.path().empty() && errno != EEXIST) fail(errno, "open");
         if (part.path().empty()) {
             part = take(path);
-            if (part.path().empty() || ::ftruncate(part.file(), 0) != 0) continue;
+            if (part.path().empty() || !os::empty_file(part.file())) continue;
         }
         for (int m = n + 1; m <= n + looked_at; ++m)
-            if (const locked_part left = take(name_of_part(target, m)); !left.path().empty())
-                ::unlink(left.path().c_str());
+            if (const locked_part left = take(name_of_part(target, m)); !left.path().empty()) {
+                std::error_code ignored;
+                fs::remove(left.path(), ignored);
+            }
         return part;
     }
     fail(EEXIST, "open");
@@ -106,9 +100,9 @@ locked_part open_part_file(const fs::path& target) {
 locked_part make_part_folder(const fs::path& target) {
     for (int n = 0; n < most_parts; ++n) {
         const fs::path path = name_of_part(target, n);
-        bool is_new = ::mkdir(path.c_str(), 0777) == 0;
+        bool is_new = os::make_folder(path);
         if (!is_new && errno != EEXIST) fail(errno, "make a folder");
-        if (!is_new && remove_left_folder(path)) is_new = ::mkdir(path.c_str(), 0777) == 0;
+        if (!is_new && remove_left_folder(path)) is_new = os::make_folder(path);
         if (!is_new) continue;
         locked_part part = create(path / part_folder_lock);
         if (part.path().empty()) continue; // another process has taken it for one that was left

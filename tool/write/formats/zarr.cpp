@@ -11,6 +11,7 @@
 #include "zarr_levels.hpp"
 
 #include "model/parallel.hpp"
+#include "model/system.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -110,12 +111,14 @@ public:
     output_folder& operator=(const output_folder&) = delete;
     ~output_folder() {
         std::error_code ignored;
+        if constexpr (os::open_files_keep_folders) part_.release();
         if (!path_.empty()) fs::remove_all(path_, ignored);
     }
     [[nodiscard]] const fs::path& path() const { return path_; }
     void commit() {
         std::error_code ignored;
         fs::remove(part_.path(), ignored);
+        if constexpr (os::open_files_keep_folders) part_.release();
         replace_zarr(path_, target_);
         path_.clear();
     }
