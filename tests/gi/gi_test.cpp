@@ -156,6 +156,59 @@ TEST(Gi, AWallThatIsTurnedIsLitEvenly) {
     }
 }
 
+// A block on a wide floor in the light of an even sky, from above and beside; with a second block on it.
+scene blocks_on_a_floor() {
+    gi::scene_builder b;
+    const auto box = [&](gi::vec3 low, gi::vec3 high) {
+        gi::mesh m;
+        m.add_box(low, high);
+        b.add(std::move(m), {.color = glm::vec3(0.8f)});
+    };
+    box({-2, -0.3, -2}, {2, 0, 2});
+    box({-0.6, 0, -0.6}, {0.6, 0.5, 0.6});
+    box({-0.3, 0.5, -0.3}, {0.3, 1.0, 0.3});
+    scene s = b.finish();
+    s.light.color = glm::vec3(0.0f);
+    s.sky_above = s.sky_level = glm::vec3(1.0f);
+    s.view = [](double) { return gi::camera{{2.2, 2.0, 2.6}, {0, 0.3, 0}, 34}; }; // sees no edge of the floor
+    return s;
+}
+// Faces that other parts cover, as the block's foot and the floor under it, darken no voxel that is seen.
+TEST(Gi, NoVoxelIsBlack) {
+    for (const bool thorough : {false, true}) {
+        settings how = small(160, 90, 48);
+        how.view = gi::view_choice::level;
+        how.thorough = thorough;
+        int least = 255;
+        for (const glm::u8vec4& c : gi::make_cpu_renderer(blocks_on_a_floor(), how)->render(0.0).pixels)
+            least = std::min(least, int{c.r});
+        std::printf("%s: the darkest voxel has %d of 255\n", thorough ? "thorough" : "a frame", least);
+        EXPECT_GT(least, 30);
+    }
+}
+
+// Light at the foot of a wall beside that of the open floor, in percent, of thorough pictures and of frames.
+TEST(Gi, ThoroughPicturesHaveNoSeamsInCorners) {
+    const auto darkest = [](bool thorough) {
+        scene s = blocks_on_a_floor();
+        s.view = [](double) { return gi::camera{{0.1, 2.4, 2.4}, {0, 0, 0.7}, 8}; }; // the foot of the large block
+        settings how = small(96, 54, 64);
+        how.samples = 2;
+        how.view = gi::view_choice::indirect;
+        how.thorough = thorough;
+        int least = 255, most = 0;
+        for (const glm::u8vec4& c : gi::make_cpu_renderer(std::move(s), how)->render(0.0).pixels) {
+            least = std::min(least, int{c.g});
+            most = std::max(most, int{c.g});
+        }
+        return 100 * least / most;
+    };
+    const int frame = darkest(false), thorough = darkest(true);
+    std::printf("a foot has %d %% of the floor's brightness, %d %% in a thorough picture\n", frame, thorough);
+    EXPECT_GT(thorough, frame + 10);
+    EXPECT_GT(thorough, 60);
+}
+
 // A hollow cube in the sun, seen from inside.
 scene closed_box(double thickness, bool roof) {
     gi::scene_builder b;
@@ -184,15 +237,18 @@ scene closed_box(double thickness, bool roof) {
 TEST(Gi, AClosedRoomStaysDark) {
     // Without its roof the room is bright, so the light is there.
     EXPECT_GT(mean_of(gi::make_cpu_renderer(closed_box(0.14, false), small(48, 48, 48))->render(0.0).pixels), 75.0);
-    for (const double voxels : {2.0, 3.0}) { // thickness of the walls
-        const auto room = gi::make_cpu_renderer(closed_box(voxels * 2 / (46 - 2 * voxels), true), small(48, 48, 48));
-        for (const double time : {0.0, 0.3, 0.7}) {
-            const pixels seen = room->render(time).pixels;
-            EXPECT_LE(largest_of(seen), 12); // without the roof the mean is more than 75
-            std::printf("walls of %.0f voxels: at most %d of 255, mean %.3f\n", voxels, largest_of(seen),
-                        mean_of(seen));
+    for (const bool thorough : {false, true})
+        for (const double voxels : {2.0, 3.0}) { // thickness of the walls
+            settings how = small(48, 48, 48);
+            how.thorough = thorough;
+            const auto room = gi::make_cpu_renderer(closed_box(voxels * 2 / (46 - 2 * voxels), true), how);
+            for (const double time : {0.0, 0.3, 0.7}) {
+                const pixels seen = room->render(time).pixels;
+                EXPECT_LE(largest_of(seen), 12); // without the roof the mean is more than 75
+                std::printf("%s, walls of %.0f voxels: at most %d of 255, mean %.3f\n",
+                            thorough ? "thorough" : "a frame", voxels, largest_of(seen), mean_of(seen));
+            }
         }
-    }
 }
 
 TEST(Gi, FramesOfASceneThatStandsStillAreTheSame) {
