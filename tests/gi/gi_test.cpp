@@ -6,6 +6,7 @@
 
 #include "closed_parts.hpp"
 #include "parts.hpp"
+#include "picture.hpp"
 #include "renderer.hpp"
 
 #include <gtest/gtest.h>
@@ -207,6 +208,36 @@ TEST(Gi, ThoroughPicturesHaveNoSeamsInCorners) {
     std::printf("a foot has %d %% of the floor's brightness, %d %% in a thorough picture\n", frame, thorough);
     EXPECT_GT(thorough, frame + 10);
     EXPECT_GT(thorough, 60);
+}
+
+// Pictures of the samples: a hollow ball whose voxels are as wide as a pixel has neither stripes nor specks of shadow
+// where the light of the voxels around a point is taken; lit by its own sides, it has.
+TEST(SamplePictures, ARoundSurfaceIsLitEvenly) {
+    const auto largest_step = [](int smooth) {
+        const glm::ivec3 extent(64);
+        const auto color = [](int x, int y, int z) {
+            const float away = glm::length(glm::vec3(x, y, z) + 0.5f - 32.0f);
+            return glm::vec3(away > 29.0f && away < 30.8f ? 0.8f : -1.0f);
+        };
+        const picture::scene ball(extent, color, smooth);
+        float most = 0.0f;
+        for (int y = 44; y < 54; ++y) { // the side that the sun shines on, from pixel to pixel
+            float last = -1.0f;
+            for (int x = 44; x < 54; ++x) {
+                const glm::vec3 from(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f, 100.0f);
+                const float seen =
+                    ball.look(from, glm::normalize(glm::vec3(1e-3f, -2e-3f, -1.0f)), false, {0.5f, 0.5f}).x;
+                if (last >= 0.0f) most = std::max(most, std::abs(seen - last));
+                last = seen;
+            }
+        }
+        return most;
+    };
+    const float sides = largest_step(0), around = largest_step(4);
+    std::printf("neighbours differ by at most %.3f, by their own sides %.3f\n", static_cast<double>(around),
+                static_cast<double>(sides));
+    EXPECT_LT(around, 0.025f);
+    EXPECT_GT(sides, 2.0f * around);
 }
 
 // A hollow cube in the sun, seen from inside.
