@@ -221,8 +221,10 @@ private:
         if (how_.thorough && view != view_choice::direct) trace(find_walls{w, lists, order, data});
         if (view != view_choice::direct)
             trace(receive_light{w, mips_.view(), order, view == view_choice::ao, pixel_cones_, data});
+        world shiny = w; // reflections have one cone, whose samples overlap more
+        shiny.shape = cone_shape{};
         if (view == view_choice::final || view == view_choice::indirect)
-            trace(receive_mirrored{w, mips_.view(), rays, order, data});
+            trace(receive_mirrored{shiny, mips_.view(), rays, order, data});
         watch_.end("cones");
         backend_.for_each(pixels_.size(),
                           draw_pixels{w, rays, view, how_.samples, scene_.exposure, order, data, pixels_.data()});

@@ -93,8 +93,10 @@ struct fold_fragments {
             sum.light = sum.light * part;
             sum.color = sum.color * part;
             sum.has_side = sum.density <= 1.0f && length > 0.3f * count;
-            sum.two_sided = sum.density > 1.0f || !(length > 0.02f * count);
-            sum.normal = length > 0.02f * count ? sum.normal / length : glm::vec3(0, 1, 0);
+            // What is covered on all sides takes no light: it would shine into the rooms on both sides of a thin wall.
+            const bool faces = length > 0.02f * count, seen = count >= 1.0f;
+            sum.two_sided = sum.density > 1.0f || !faces;
+            sum.normal = faces ? sum.normal / length : seen ? glm::vec3(0, 1, 0) : glm::vec3(0.0f);
         }
         out[i] = sum;
     }
@@ -114,6 +116,7 @@ struct find_voxel_walls {
     glm::vec3* moved;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (voxels[i].normal == glm::vec3(0.0f)) return; // sends no cone
         const glm::vec3 at = glm::vec3(lists.voxel(lists.voxels[i])) + 0.5f;
         moved[i] = off_walls(world, lists, at, voxels[i].normal, voxel_cone_width);
     }
