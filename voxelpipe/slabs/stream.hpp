@@ -277,12 +277,7 @@ private:
                             });
         if (!s.ok()) return s;
         if constexpr (Kind != kinds::surface) repairs_.count(all.solid);
-        const counters drawn = all.counts;
-        all.counts = counts_;
-        all.counts.fragments = drawn.fragments;
-        all.counts.fragments_discarded = drawn.fragments_discarded;
-        all.counts.voxels = drawn.voxels;
-        return all;
+        return with_triangles(all, counts_);
     }
 
     // Puts the slabs into the queue. last_axis: that they may be cut along.
