@@ -118,25 +118,40 @@ inline made made_of(const octahedra& m, const doubled& program) {
     return all;
 }
 
+// A body, and what `doubled` makes of it.
+template <class Backend>
+struct doubled_body {
+    doubled program{{1.5f, 0.25f, 7.0f}};
+    octahedra m;
+    made expected;
+    vp::grid g;
+    vp::mesh<Backend> in;
+    vp::mesh<Backend, float> out;
+
+    explicit doubled_body(Backend& backend)
+        : m([] {
+              octahedra one;
+              one.add({9.25f, 8.5f, 8.0f}, 5.75f);
+              return one;
+          }()),
+          expected(made_of(m, program)), in(backend, m.positions, m.triangles),
+          out(backend, expected.positions, expected.triangles, expected.weights) {
+        g.extent = {20, 17, 22};
+    }
+};
+
 template <class Backend>
 void expect_distances_of_programs(Backend& backend) {
-    octahedra m;
-    m.add({9.25f, 8.5f, 8.0f}, 5.75f);
-    const doubled program{{1.5f, 0.25f, 7.0f}};
-    const made expected_mesh = made_of(m, program);
-    vp::grid g;
-    g.extent = {20, 17, 22};
-    const vp::mesh<Backend> in(backend, m.positions, m.triangles);
-    const vp::mesh<Backend, float> out(backend, expected_mesh.positions, expected_mesh.triangles,
-                                       expected_mesh.weights);
+    const doubled_body<Backend> body(backend);
+    const vp::grid& g = body.g;
     for (const vp::repair repair : {vp::repair::none, vp::repair::close_holes})
         for (const vp::band& band : {vp::band(2.5), vp::band(vp::band::whole)}) {
             const vp::distance_options how{.band = band, .repair = repair};
             distance_targets<Backend> a{backend, g.extent}, b{backend, g.extent};
             const vp::status expected =
-                vp::voxelize_distance(backend, out, g, given_weight{}, numbers_of_distance{}, a, how);
-            const vp::status found =
-                vp::voxelize_distance(backend, in, g, weighted{}, vp::geometry{program}, numbers_of_distance{}, b, how);
+                vp::voxelize_distance(backend, body.out, g, given_weight{}, numbers_of_distance{}, a, how);
+            const vp::status found = vp::voxelize_distance(backend, body.in, g, weighted{}, vp::geometry{body.program},
+                                                           numbers_of_distance{}, b, how);
             ASSERT_TRUE(expected.ok() && found.ok()) << expected.message() << found.message();
             EXPECT_EQ(found.counts, expected.counts);
             EXPECT_EQ(found.solid, expected.solid);
@@ -146,7 +161,7 @@ void expect_distances_of_programs(Backend& backend) {
             EXPECT_EQ(vp::get<2>(b).to_host(backend), vp::get<2>(a).to_host(backend));
             auto numbers = vp::get<1>(a).to_host(backend);
             for (glm::uvec4& n : numbers)
-                if (n.y != ~0u) n.x = expected_mesh.origins[n.y];
+                if (n.y != ~0u) n.x = body.expected.origins[n.y];
             EXPECT_EQ(vp::get<1>(b).to_host(backend), numbers);
         }
 }
@@ -175,20 +190,13 @@ void expect_distances_without_what_is_left_out(Backend& backend) {
 
 template <class Backend>
 void expect_cells_of_programs(Backend& backend) {
-    octahedra m;
-    m.add({9.25f, 8.5f, 8.0f}, 5.75f);
-    const doubled program{{1.5f, 0.25f, 7.0f}};
-    const made expected_mesh = made_of(m, program);
-    vp::grid g;
-    g.extent = {20, 17, 22};
-    const vp::mesh<Backend> in(backend, m.positions, m.triangles);
-    const vp::mesh<Backend, float> out(backend, expected_mesh.positions, expected_mesh.triangles,
-                                       expected_mesh.weights);
+    const doubled_body<Backend> body(backend);
+    const vp::grid& g = body.g;
     vp::framebuffer<Backend, vp::target<float, vp::blend::replace>> a{backend, g.extent}, b{backend, g.extent};
     const vp::cell_options how{.repair = vp::repair::close_holes};
-    const vp::status expected = vp::voxelize_cells(backend, out, g, given_weight{}, vp::fraction{}, a, how);
+    const vp::status expected = vp::voxelize_cells(backend, body.out, g, given_weight{}, vp::fraction{}, a, how);
     const vp::status found =
-        vp::voxelize_cells(backend, in, g, weighted{}, vp::geometry{program}, vp::fraction{}, b, how);
+        vp::voxelize_cells(backend, body.in, g, weighted{}, vp::geometry{body.program}, vp::fraction{}, b, how);
     ASSERT_TRUE(expected.ok() && found.ok()) << expected.message() << found.message();
     EXPECT_EQ(found.counts, expected.counts);
     EXPECT_EQ(found.cells, expected.cells);
