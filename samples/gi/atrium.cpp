@@ -197,7 +197,7 @@ scene make_atrium() {
     set_sun(s, {0.3f, 1.15f, 0.5f}, 0.008f, {30.0f, 25.0f, 17.5f});
     s.sky_above = {0.72f, 1.30f, 2.45f};
     s.sky_level = {2.20f, 2.50f, 2.85f};
-    s.exposure = 0.90f;
+    s.exposure = 1.10f;
     s.wall = 1.25 * wall; // what passes through the outer walls is not seen here
     s.motion = [](double t) {
         const double a = 2 * pi * t + 3.7;

@@ -257,9 +257,9 @@ private:
             w.light.side_v *= scale;
         }
         if (scene_.wall > 0) w.shape.widest = std::max(4.0f, static_cast<float>(2.0 * scene_.wall * per_unit_));
-        if (how_.thorough) { // what lies between narrow cones is closed by the others, so each may close less
-            w.shape.overlap = 1.5f;
-            w.shape.weight = 0.9f;
+        if (how_.thorough) { // samples as wide as their cone: 3/4 adds up to a wall (cone_shape), and arches stay open
+            w.shape.overlap = 1.0f;
+            w.shape.weight = 0.75f;
         }
         w.sky_above = scene_.sky_above;
         w.sky_level = scene_.sky_level;
