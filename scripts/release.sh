@@ -99,7 +99,7 @@ make_windows() {
     for file in libglm-dev libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev mingw-w64-x86-64-dev gcc-mingw-w64-x86-64-posix-runtime; do
         cp -L "/usr/share/doc/$file/copyright" "$licenses/$file.txt"
     done
-    x86_64-w64-mingw32-strip "$folder/work/$packed/voxelize.exe"
+    x86_64-w64-mingw32-strip -p "$folder/work/$packed/voxelize.exe"
     find "$folder/work/$packed" -exec touch -h -d "@$(git show -s --format=%ct HEAD)" {} +
     (cd "$folder/work" && find "$packed" -type f | LC_ALL=C sort | TZ=UTC zip -q -X "$folder/$packed.zip" -@)
     rm -rf "$folder/work"

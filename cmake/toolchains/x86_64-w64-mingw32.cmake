@@ -9,7 +9,8 @@ set(CMAKE_SYSTEM_PROCESSOR AMD64)
 set(CMAKE_C_COMPILER x86_64-w64-mingw32-gcc-posix)
 set(CMAKE_CXX_COMPILER x86_64-w64-mingw32-g++-posix)
 set(CMAKE_RC_COMPILER x86_64-w64-mingw32-windres)
-set(CMAKE_EXE_LINKER_FLAGS_INIT "-static -Wl,--stack,8388608") # a stack as on Linux
+# A stack as on Linux, and the same file of the same objects.
+set(CMAKE_EXE_LINKER_FLAGS_INIT "-static -Wl,--stack,8388608 -Wl,--no-insert-timestamp")
 set(CMAKE_CXX_FLAGS_INIT -Wa,-mbig-obj) # objects of many templates
 find_program(voxelpipe_wine NAMES wine64 wine)
 if(voxelpipe_wine)
