@@ -57,6 +57,17 @@ void divide(T* values, const std::uint32_t* counts, std::size_t n, std::size_t c
     return coordinates;
 }
 
+// The tiles of a table, four numbers for each: its first voxel (x, y, z), and its side in voxels.
+[[nodiscard]] inline std::vector<std::int32_t> cubes_of(const brick_table& table) {
+    std::vector<std::int32_t> cubes;
+    cubes.reserve(4 * static_cast<std::size_t>(table.num_tiles));
+    for (std::uint64_t t = 0; t < table.num_tiles; ++t) {
+        const glm::ivec3 first = table.tiles[t].origin() - table.offset;
+        cubes.insert(cubes.end(), {first.x, first.y, first.z, table.tiles[t].side()});
+    }
+    return cubes;
+}
+
 // Components values for each voxel, and the voxels' indices where they are asked for.
 template <class T>
 struct sparse_values {

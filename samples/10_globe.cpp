@@ -66,9 +66,9 @@ int main() {
             glm::mix(glm::vec3(0.08f, 0.22f, 0.42f), glm::vec3(0.20f, 0.52f, 0.62f), glm::smoothstep(0.38f, 0.5f, h));
         const glm::vec3 plain = glm::mix(glm::vec3(0.25f, 0.47f, 0.19f), glm::vec3(0.80f, 0.67f, 0.42f), dry);
         const glm::vec3 hill = glm::mix(plain, glm::vec3(0.45f, 0.37f, 0.30f), glm::smoothstep(0.58f, 0.66f, h));
-        const glm::vec3 land = glm::mix(hill, glm::vec3(0.96f), glm::smoothstep(0.69f, 0.73f, h));
+        const glm::vec3 land = glm::mix(hill, glm::vec3(0.86f), glm::smoothstep(0.69f, 0.73f, h));
         heights.push_back(h);
-        colors.push_back(glm::mix(h < 0.5f ? sea : land, glm::vec3(0.94f, 0.97f, 1.0f), ice));
+        colors.push_back(glm::mix(h < 0.5f ? sea : land, glm::vec3(0.82f, 0.85f, 0.88f), ice));
     }
     std::vector<glm::vec3> positions;
     std::vector<glm::uvec3> triangles;
@@ -101,7 +101,7 @@ int main() {
         const std::uint32_t n = counts(x, y, z);
         return n == 0 ? glm::vec3(-1.0f) : sums(x, y, z) / static_cast<float>(n);
     };
-    picture::write("globe.ppm", grid.extent, mean, {.along = {-0.5f, -0.35f, -1.0f}, .zoom = 1.45f});
+    picture::write("globe.ppm", grid.extent, mean, {.along = {-0.5f, -0.35f, -1.0f}, .zoom = 1.45f, .smooth = 4});
     std::printf("%zu triangles, %llu voxels\n", triangles.size(), static_cast<unsigned long long>(s.counts.voxels));
     const int middle = 96 * finer;
     return s.counts.voxels > 60000 && counts(middle, middle, middle) == 0 && mean(middle, middle, middle).x < 0.0f ? 0

@@ -99,7 +99,7 @@ int main() {
     const auto host = vp::get<0>(fb).to_host_target(backend);
     const glm::vec3 colors[] = {glm::vec3(-1.0f), {0.86f, 0.64f, 0.26f}, {0.52f, 0.60f, 0.68f}, {0.92f, 0.13f, 0.10f}};
     picture::write("gears.ppm", grid.extent, [&](int x, int y, int z) { return colors[host(x, y, z)]; },
-                   {.along = {-0.2f, -1.0f, -0.62f}, .zoom = 1.38f, .aspect = 1.6f});
+                   {.along = {-0.2f, -1.0f, -0.62f}, .zoom = 1.38f, .aspect = 1.6f, .smooth = 5});
     std::printf("free from %.2f voxels between the axes; 3 closer, %llu voxels collide; %llu open rows\n",
                 static_cast<double>(free), static_cast<unsigned long long>(closer),
                 static_cast<unsigned long long>(open_rows));

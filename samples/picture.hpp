@@ -23,13 +23,17 @@ struct view {
     float zoom = 1.0f;
     bool has_floor = true; // below the lowest voxel
     float aspect = 1.25f;  // width / height
+    // How many voxels around it a point is lit by: 0 shades the sides of voxels. For voxels of about a pixel, whose
+    // sides would make stripes and speckles of a surface that is round.
+    int smooth = 0;
 };
 
 class scene {
 public:
-    // color(x, y, z) is a voxel's colour, 0 to 1; negative if it is empty.
+    // color(x, y, z) is a voxel's colour, 0 to 1; negative if it is empty. smooth: as in view.
     template <class Color>
-    scene(const glm::ivec3& extent, const Color& color) : extent_(extent), low_(extent), high_(0) {
+    scene(const glm::ivec3& extent, const Color& color, int smooth = 0)
+        : extent_(extent), low_(extent), high_(0), smooth_(smooth) {
         voxels_.reserve(static_cast<std::size_t>(extent.x) * static_cast<std::size_t>(extent.y) *
                         static_cast<std::size_t>(extent.z));
         for (int z = 0; z < extent.z; ++z)
@@ -43,6 +47,7 @@ public:
                     high_ = glm::max(high_, glm::ivec3(x + 1, y + 1, z + 1));
                 }
         if (high_.x == 0) low_ = glm::ivec3(0), high_ = extent;
+        if (smooth_ > 0) find_outside();
     }
 
     // The colour along a ray, and of the sky where it meets nothing; `noise`, 0 to 1, moves the sun within its disc.
@@ -56,6 +61,11 @@ public:
             const glm::vec3 at = from + h.t * along;
             const glm::u8vec4 c = get(h.voxel);
             const glm::vec3 albedo = glm::pow(glm::vec3(c) / 255.0f, glm::vec3(2.2f));
+            if (smooth_ > 0) {
+                const round_surface s = round_off(at, h);
+                // The ray to the sun starts over the steps of the voxels, which would throw shadows on each other.
+                return albedo * light(at + 2.0f * s.normal, s.normal, sun, s.open);
+            }
             return albedo * light(at, h.normal, sun, corner_light(at, h));
         }
         const glm::vec3 sky = glm::mix(glm::vec3(0.70f, 0.74f, 0.78f), glm::vec3(0.36f, 0.47f, 0.60f),
@@ -79,13 +89,56 @@ private:
         float t;
     };
 
+    [[nodiscard]] bool is_within(const glm::ivec3& v) const {
+        return v.x >= 0 && v.y >= 0 && v.z >= 0 && v.x < extent_.x && v.y < extent_.y && v.z < extent_.z;
+    }
+    [[nodiscard]] std::size_t index(const glm::ivec3& v) const {
+        return (static_cast<std::size_t>(v.z) * static_cast<std::size_t>(extent_.y) + static_cast<std::size_t>(v.y)) *
+                   static_cast<std::size_t>(extent_.x) +
+               static_cast<std::size_t>(v.x);
+    }
     [[nodiscard]] glm::u8vec4 get(const glm::ivec3& v) const {
-        if (v.x < 0 || v.y < 0 || v.z < 0 || v.x >= extent_.x || v.y >= extent_.y || v.z >= extent_.z)
-            return glm::u8vec4(0);
-        return voxels_[(static_cast<std::size_t>(v.z) * static_cast<std::size_t>(extent_.y) +
-                        static_cast<std::size_t>(v.y)) *
-                           static_cast<std::size_t>(extent_.x) +
-                       static_cast<std::size_t>(v.x)];
+        return is_within(v) ? voxels_[index(v)] : glm::u8vec4(0);
+    }
+
+    // Empty voxels that a line along an axis reaches from outside. The others count as filled where a surface is
+    // rounded off: within a closed shell they do not lie in front of it.
+    void find_outside() {
+        outside_.assign(voxels_.size(), 0);
+        for (int axis = 0; axis < 3; ++axis) {
+            const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+            glm::ivec3 p;
+            for (p[v] = 0; p[v] < extent_[v]; ++p[v])
+                for (p[u] = 0; p[u] < extent_[u]; ++p[u]) {
+                    for (p[axis] = 0; p[axis] < extent_[axis] && get(p).a == 0; ++p[axis]) outside_[index(p)] = 1;
+                    for (p[axis] = extent_[axis] - 1; p[axis] >= 0 && get(p).a == 0; --p[axis]) outside_[index(p)] = 1;
+                }
+        }
+    }
+
+    // The surface of all voxels around a point of a side: its normal, away from what is filled, and how much of the sky
+    // it sees, which is 1 where it is flat, also half a voxel below the outermost step.
+    struct round_surface {
+        glm::vec3 normal;
+        float open;
+    };
+    [[nodiscard]] round_surface round_off(const glm::vec3& at, const hit& h) const {
+        glm::vec3 sum(0.0f);
+        float open = 0.0f, all = 0.0f; // weights of the empty voxels, and of all
+        for (int z = -smooth_; z <= smooth_; ++z)
+            for (int y = -smooth_; y <= smooth_; ++y)
+                for (int x = -smooth_; x <= smooth_; ++x) {
+                    const glm::ivec3 p = h.voxel + glm::ivec3(x, y, z);
+                    const glm::vec3 step = glm::vec3(p) + 0.5f - at;
+                    const float weight = 1.0f - glm::length(step) / static_cast<float>(smooth_);
+                    if (weight <= 0.0f) continue;
+                    all += weight;
+                    if (is_within(p) && outside_[index(p)] == 0) continue;
+                    sum += weight * step;
+                    open += weight;
+                }
+        const float length = glm::length(sum);
+        return {length > 0.0f ? sum / length : h.normal, glm::min(1.0f, 2.3f * open / all)};
     }
 
     // The first voxel on a ray, from side to side within the box of all voxels.
@@ -147,7 +200,9 @@ private:
     }
 
     glm::ivec3 extent_, low_, high_;
+    int smooth_;
     std::vector<glm::u8vec4> voxels_;
+    std::vector<std::uint8_t> outside_; // 1 for voxels of find_outside
 };
 
 // The sky along a ray, with a glare around the sun, and a floor of tiles: for samples that shade by themselves.
@@ -203,7 +258,7 @@ void write_pixels(const std::string& path, float aspect, const Look& look) {
 
 template <class Color>
 void write(const std::string& path, const glm::ivec3& extent, const Color& color, const view& v = {}) {
-    const scene s(extent, color);
+    const scene s(extent, color, v.smooth);
     const glm::vec3 along = glm::normalize(v.along);
     const glm::vec3 right = glm::normalize(glm::cross(along, glm::vec3(0, 1, 0))), up = glm::cross(right, along);
     const float distance = 1.75f * s.size() / v.zoom, tangent = 0.36f;

@@ -8,6 +8,7 @@
 
 #include <voxelpipe/abuffer.hpp>
 #include <voxelpipe/blend.hpp>
+#include <voxelpipe/cells/cell_programs.hpp>
 #include <voxelpipe/cells/cells.hpp>
 #include <voxelpipe/cells/links.hpp>
 #include <voxelpipe/cells/sparse_cells.hpp>
@@ -20,6 +21,7 @@
 #include <voxelpipe/grid.hpp>
 #include <voxelpipe/label/label.hpp>
 #include <voxelpipe/mesh.hpp>
+#include <voxelpipe/programs/distance_programs.hpp>
 #include <voxelpipe/programs/element_call.hpp>
 #include <voxelpipe/programs/elements.hpp>
 #include <voxelpipe/programs/field.hpp>

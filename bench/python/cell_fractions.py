@@ -4,23 +4,27 @@
 """Times fractions of voxels beside what trimesh, Open3D and PyVista give by supersampling, with the errors of that.
 
     bench/python/cell_fractions.py [--out FILE] [--resolutions 64 128 256] [--samples 6] [--voxels 2000] [--levels 8] [--seconds 2] [--most 20]
+                                   [--processor-time]
 
 The mesh is a sphere of 8 * 4^levels triangles, 524,288 of them at --levels 8. Two ways without fractions:
 - averaged: a mask of the grid that is --samples times finer along each axis, slab by slab, whose samples are averaged;
 - queries: --samples^3 points in each voxel that is cut are asked whether they lie inside. --voxels of these voxels are measured, spread
   over all, or as many as take about --most seconds; the time is scaled to all of them, and of the other voxels nothing is asked.
 Making the peers' trees is not counted. Each cell is the median of at least three calls, or of one that takes longer than --seconds. A peer
-that is not installed is left out. Errors are of voxels that are cut, against our fractions.
+that is not installed is left out. Errors are of voxels that are cut, against our fractions. --processor-time measures that, of all cores
+together, for machines that do other work meanwhile; it hides what threads gain.
 """
 import argparse
 import csv
 import os
 import platform
 import sys
+import time
 
 import numpy as np
 import voxelpipe as vp
 
+import compare
 from compare import ROOT, timed
 from versions import version
 
@@ -118,12 +122,15 @@ def main():
     parser.add_argument("--levels", type=int, default=8)
     parser.add_argument("--seconds", type=float, default=2)
     parser.add_argument("--most", type=float, default=20)
+    parser.add_argument("--processor-time", action="store_true")
     args = parser.parse_args()
+    if args.processor_time:
+        compare.clock = time.process_time
 
     mesh = sphere(levels=args.levels)
     versions = ", ".join(f"{p} {version(p)}" for p in ("voxelpipe", "numpy", "trimesh", "open3d", "pyvista") if version(p))
     print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, {versions}")
-    print(f"{len(mesh[1])} triangles, {args.samples}^3 samples a voxel")
+    print(f"{len(mesh[1])} triangles, {args.samples}^3 samples a voxel{', processor time' if args.processor_time else ''}")
     rows, first = [], 0  # of the resolution
 
     def add(program, way, n, ms, of, errors):

@@ -1,8 +1,8 @@
 /* SPDX-FileCopyrightText: 2026 The VoxelPipe authors
  * SPDX-License-Identifier: Apache-2.0
  *
- * The C API of VoxelPipe: surfaces, solids, values of attributes, lists of voxels, distance fields and cut cells of
- * triangle meshes, with the bits of the C++ library. C99 and C++.
+ * The C API of VoxelPipe: surfaces, solids, values of attributes, lists of voxels, distance fields, cut cells and links
+ * of triangle meshes, with the bits of the C++ library. C99 and C++.
  *
  * Errors. Every call that can fail returns a vp_code; VP_OK is 0. vp_last_message() then has one line of English that
  * says what was wrong. No exception leaves the library and no argument ends the program, except memory that is not
@@ -323,6 +323,35 @@ typedef struct vp_fraction_options {
  * VP_TYPE_FLOAT32. */
 VP_API vp_code vp_fractions(vp_context* context, const vp_mesh* mesh, const vp_grid* grid,
                             const vp_fraction_options* options, const vp_array* out, vp_counters* counters);
+
+/* ---- Links: walls between the nodes of lattice Boltzmann solvers ------------------------------------------------- */
+
+/* The voxels of which a link is crossed. A link goes from a voxel's centre to that of a neighbour, which may lie beyond
+ * the grid. */
+typedef struct vp_links vp_links;
+
+typedef struct vp_link_options {
+    uint32_t struct_size;
+    int32_t neighbours; /* of a voxel: 18, through faces and edges (D3Q19); 26, corners too (D3Q27); 0: 18 */
+} vp_link_options;
+
+/* The step x, y, z to the neighbour that link 0 to 25 leads to: 0 to 5 through faces, to 17 through edges, the others
+ * through corners. Links i and i ^ 1 are opposite each other. */
+VP_API vp_code vp_link_direction(int32_t link, int32_t direction[3]);
+
+/* Where the mesh, which may be open, crosses links: exact, on a closed mesh between all voxels that VP_EXTENT_CENTRE
+ * parts. counters: `voxels` with a crossed link, `fragments` the crossed links. */
+VP_API vp_code vp_links_create(vp_context* context, const vp_mesh* mesh, const vp_grid* grid,
+                               const vp_link_options* options, vp_links** links, vp_counters* counters);
+/* Number of voxels, which lie by z, then y, then x, and of links of each; `neighbours` may be null. */
+VP_API vp_code vp_links_size(const vp_links* links, uint64_t* voxels, uint32_t* neighbours);
+/* Copies voxels [first, first + count). coordinates: 3 * count, the voxel's x, y, z in the computed part of the grid.
+ * The others have neighbours * count elements, -1 for a link that is not crossed. q: the part of the link before its
+ * first crossing, above 0 to 1, rounded once. triangles, parts: the triangle of the mesh that is crossed there, and its
+ * part. Each may be null. VP_ERROR_BAD_INDEX for a range that leaves the list. */
+VP_API vp_code vp_links_read(const vp_links* links, uint64_t first, uint64_t count, int32_t* coordinates, float* q,
+                             int64_t* triangles, int32_t* parts);
+VP_API void vp_links_destroy(vp_links* links);
 
 #ifdef __cplusplus
 }

@@ -42,6 +42,14 @@ struct vp_list {
     std::vector<std::int32_t> coordinates; // x, y, z of each voxel
     std::vector<float> values;             // columns of each voxel
 };
+struct vp_links {
+    static constexpr std::uint64_t its_kind = 0x7670'6c69'6e6b'7320; // "vplinks "
+    std::uint64_t kind = its_kind;
+    std::uint32_t neighbours = 18;
+    std::vector<glm::ivec3> voxels;
+    std::vector<float> q;                        // `neighbours` of each voxel, as these:
+    std::vector<std::uint32_t> triangles, parts; // voxelpipe::no_crossing without
+};
 
 namespace voxelpipe::capi {
 

@@ -31,20 +31,20 @@ CPP = {
     "abuffers": ("A-buffers", "Every fragment of every voxel. In the paper: A-buffer and bucketing.", ["abuffer.hpp"]),
     "solids": ("Solids", "The inside of meshes.", ["solid/solid.hpp", "solid/diagnose_repair.hpp", "solid/core/crossing.hpp", "solid/core/row_crossing.hpp"]),
     "surfaces": ("Surfaces", "Closed manifold meshes of bits, fields and any triangles.",
-                 ["surfaces/surface.hpp", "surfaces/extract.hpp", "surfaces/extract_slab.hpp", "surfaces/extract_sparse.hpp", "surfaces/device/extract_async.cuh",
-                  "surfaces/remesh.hpp", "surfaces/remesh_sparse.hpp"]),
+                 ["surfaces/surface.hpp", "surfaces/extract.hpp", "surfaces/extract_slab.hpp", "surfaces/surface_layers.hpp", "surfaces/extract_sparse.hpp", "surfaces/device/extract_async.cuh",
+                  "surfaces/remesh.hpp", "surfaces/remesh_slab.hpp", "surfaces/remesh_sparse.hpp", "surfaces/device/remesh_async.cuh"]),
     "distances": ("Distances", "Signed distances from meshes, and the nearest triangle.",
-                  ["distance/distance.hpp", "distance/sparse_distance.hpp", "distance/distance_ray.hpp",
+                  ["distance/distance.hpp", "distance/sparse_distance.hpp", "programs/distance_programs.hpp", "distance/distance_ray.hpp",
                    "distance/device/distance_async.cuh", "distance/core/point_triangle.hpp"]),
     "label": ("Labels", "Connected components of bits.", ["label/label.hpp", "label/voxel_component.hpp"]),
-    "cells": ("Cut cells", "How much of each voxel is inside, and where links between voxels are cut.", ["cells/cells.hpp", "cells/sparse_cells.hpp", "cells/device/cells_async.cuh", "cells/links.hpp", "cells/core/link_crossing.hpp"]),
+    "cells": ("Cut cells", "How much of each voxel is inside, and where links between voxels are cut.", ["cells/cells.hpp", "cells/sparse_cells.hpp", "cells/cell_programs.hpp", "cells/device/cells_async.cuh", "cells/links.hpp", "cells/core/link_crossing.hpp"]),
     "sparse": ("Sparse grids", "Memory in proportion to the voxels that are drawn: bricks, octrees, files.",
                ["sparse/sparse.hpp", "sparse/host_sparse.hpp", "sparse/sparse_merge.hpp", "core/brick_table.hpp", "core/brick_tile.hpp", "sparse/brick_lookup.hpp", "sparse/octree.hpp", "core/octree_view.hpp",
                 "levels/reducers.hpp", "sparse/octree_dag.hpp", "sparse/backend_octree.hpp", "sparse/backend_octree_dag.hpp", "core/octree_dag_view.hpp", "sparse/io/nanovdb.hpp"]),
     "levels": ("Levels and rays of dense grids", "Coarser levels of targets, levels of light for cone tracing, rays through bits.",
                ["levels/dense_levels.hpp", "levels/direction_mips.hpp", "levels/dense_bits.hpp", "levels/cell_walk.hpp"]),
     "slabs": ("Slabs", "Meshes and grids beyond one memory or one machine: plans, out-of-core streams, MPI.",
-              ["slabs/stream.hpp", "slabs/slab_lists.hpp", "slabs/mpi.hpp", "slabs/plan.hpp", "slabs/records.hpp", "slabs/bins.hpp"]),
+              ["slabs/stream.hpp", "slabs/stream_surface.hpp", "slabs/slab_lists.hpp", "slabs/mpi.hpp", "slabs/plan.hpp", "slabs/records.hpp", "slabs/bins.hpp"]),
     "streams": ("Streams and graphs", "Calls that never wait, with memory of the caller. For cuda_backend.",
                 ["device/voxelize_async.cuh", "device/abuffer_async.cuh", "solid/device/solid_async.cuh",
                  "sparse/device/sparse_result.cuh", "sparse/device/sparse_async.cuh", "sparse/device/sparse_merge_async.cuh", "sparse/device/sparse_solid_async.cuh", "programs/device/program_async.cuh",
@@ -89,7 +89,7 @@ TASKS = [
 ]
 # Shown nowhere: what the library uses to write NanoVDB files.
 HIDDEN = ["sparse/io/nanovdb_nodes.hpp"]
-PYTHON = ["Grid", "fit", "load_model", "Model", "Material", "Texture", "Part", "voxelize", "solid", "tiles", "distance", "distance_at", "fractions", "links", "Links", "label", "remesh", "extract",
+PYTHON = ["Grid", "fit", "load_model", "Model", "Material", "Texture", "Part", "voxelize", "solid", "tiles", "distance", "distance_at", "fractions", "sparse_fractions", "SparseFractions", "links", "Links", "label", "remesh", "extract",
           "bake", "sparse", "dense", "VoxelList", "lines", "points", "instances", "Octree", "Hits", "fragments", "Fragments", "save", "formats", "render", "view", "View",
           "DroppedTrianglesWarning", "OpenMeshWarning", "ModelWarning", "WriteError"]
 # Pictures of functions that docs/site/python_pictures.py makes none of.

@@ -86,6 +86,15 @@ show("distance", scale(field, -0.18 * size, 0.18 * size), grid, half(np.ones(gri
 part = vp.fractions(ring, coarse)
 show("fractions", scale(part, 0, 1), coarse, half(part > 0))
 
+cells = vp.sparse_fractions(ring, grid)
+blocks = np.zeros((*grid.shape, 3), np.uint8)
+blocks[grid.zyx(cells.voxels)] = np.uint8(200 * cells.values["fraction"])[:, None]
+for x, y, z, edge in cells.cubes.tolist():
+    blocks[z : z + edge, y : y + edge, x : x + edge] = 80 + np.random.default_rng(x + 999 * y + 9 * z).integers(0, 170, 3)
+listed = np.zeros(grid.shape, bool)
+listed[grid.zyx(cells.voxels)] = True
+show("sparse_fractions", blocks, grid, half(listed | (blocks > 0).any(axis=-1)))
+
 links = [torus((2.0 * i, 0.0, 0.0), 0.7, 0.22) for i in range(3)]
 chain = vp.fit(links, 2 * size)
 labels = vp.label(vp.solid(links, chain))

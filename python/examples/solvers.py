@@ -65,6 +65,17 @@ assert np.array_equal(np.diff(fluid_faces, axis=2) * 0.25**2, wall[..., 0])  # t
 area = np.linalg.norm(wall, axis=-1).sum()
 assert abs(area / (4 * np.pi * 9) - 1) < 0.01 and abs(fluid_volume.sum() / (32**3 - 36 * np.pi * 64) - 1) < 1e-3
 
+# snippet: listed
+cells = vp.sparse_fractions(body, vp.fit(body, 512), of=("fraction", "area", "area_centroid"))
+is_cut = cells.values["area"] > 0
+where, share = cells.voxels[is_cut], cells.values["fraction"][is_cut]  # x, y, z and how much is inside
+# end snippet
+
+inside = cells.values["fraction"].sum(dtype=np.float64)
+inside += (cells.cube_values["fraction"] * cells.cubes[:, 3].astype(np.float64) ** 3).sum()
+assert abs(inside * (6 / 512) ** 3 / (36 * np.pi) - 1) < 4e-3 and 0 < len(where) < len(cells.voxels)
+assert share.min() >= 0 and share.max() <= 1 and abs(cells.values["area"].sum() / (36 * np.pi) - 1) < 4e-3
+
 # snippet: densities
 materials = {"lead": 11.35, "polyethylene": 0.94}  # g/cm³
 bodies = [ball((-1.5, 0, 0), 1.2), ball((1.25, 0, 0), 1.55)]

@@ -79,6 +79,7 @@ void bind_fractions(nb::module_& m);
 void bind_label(nb::module_& m);
 void bind_links(nb::module_& m);
 void bind_sparse_float(nb::module_& m);
+void bind_sparse_fractions(nb::module_& m);
 void bind_sparse_integer(nb::module_& m);
 void bind_files(nb::module_& m);
 void bind_lists(nb::module_& m);

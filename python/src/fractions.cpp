@@ -141,17 +141,7 @@ nb::dict fractions_of(const position_array& positions, const triangle_array& tri
     const status s = inner.any()
                          ? draw_cells(positions, triangles, g, options, out.data(), measuring{shader, inner}, threads)
                          : draw_cells(positions, triangles, g, options, out.data(), shader, threads);
-    nb::dict d = report(s);
-    d["cut_voxels"] = s.cells.cut_voxels;
-    d["below_zero"] = s.cells.below_zero;
-    d["above_one"] = s.cells.above_one;
-    d["open_rows"] = s.cells.open_rows;
-    d["open_edges"] = s.cells.open_edges;
-    d["lost_centroids"] = s.cells.lost_centroids;
-    d["hole_edges"] = s.cells.hole_edges;
-    d["holes"] = s.cells.holes;
-    d["cones"] = s.cells.cones;
-    return d;
+    return report_cells(s);
 }
 
 } // namespace

@@ -14,6 +14,7 @@ NB_MODULE(_core, m) {
     python::bind_label(m);
     python::bind_links(m);
     python::bind_sparse_float(m);
+    python::bind_sparse_fractions(m);
     python::bind_sparse_integer(m);
     python::bind_files(m);
     python::bind_lists(m);

@@ -117,6 +117,21 @@ template <class T>
     return d;
 }
 
+// report(), and the counters of cut cells.
+[[nodiscard]] inline nb::dict report_cells(const status& s) {
+    nb::dict d = report(s);
+    d["cut_voxels"] = s.cells.cut_voxels;
+    d["below_zero"] = s.cells.below_zero;
+    d["above_one"] = s.cells.above_one;
+    d["open_rows"] = s.cells.open_rows;
+    d["open_edges"] = s.cells.open_edges;
+    d["lost_centroids"] = s.cells.lost_centroids;
+    d["hole_edges"] = s.cells.hole_edges;
+    d["holes"] = s.cells.holes;
+    d["cones"] = s.cells.cones;
+    return d;
+}
+
 // What diagnose_repair found.
 [[nodiscard]] inline nb::dict report_flood(const status& s) {
     (void)report(s); // throws where the call failed

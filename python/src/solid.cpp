@@ -62,11 +62,7 @@ nb::tuple solid_list(const position_array& positions, const triangle_array& tria
         s = voxelize_solid(backend, draws, g, fb, options);
         if (s.ok()) {
             const brick_table table = fb.view().table;
-            if (as_tiles)
-                for (std::uint64_t t = 0; t < table.num_tiles; ++t) {
-                    const glm::ivec3 first = table.tiles[t].origin() - table.offset;
-                    tiles.insert(tiles.end(), {first.x, first.y, first.z, table.tiles[t].side()});
-                }
+            if (as_tiles) tiles = cubes_of(table);
             voxels = coordinates_of(table, !as_tiles);
         }
     }

@@ -198,3 +198,87 @@ def test_closed_holes_are_those_of_the_closed_box():
     assert np.abs(measured["area_vector"].sum(axis=(0, 1, 2))).max() < 1e-9
     with pytest.raises(ValueError, match="repair"):
         vp.fractions(open_box, GRID, repair="vote")
+
+
+def opened(lists, grid, name):
+    """Voxels and cubes of sparse_fractions() as an array, each voxel of which was written once at most."""
+    values = lists.values[name]
+    array, times = vp.dense(lists.voxels, values, grid), vp.dense(lists.voxels, 1, grid)
+    for (x, y, z, side), value in zip(lists.cubes, lists.cube_values[name]):
+        place = np.s_[z : z + side, y : y + side, x : x + side]
+        array[place] = value
+        times[place] += 1
+    assert times.max(initial=0) <= 1
+    return array
+
+
+def test_lists_and_cubes_are_the_dense_values():
+    names = ["multi_cut", "fraction", "centroid", "area", "area_centroid"]
+    low, high = (4.03, 2.27, 3.4), (20.6, 10.9, 48.2)
+    outer, inner = box(low, high), box((7.9, 3.9, 9.7), (16.1, 8.7, 32.3))
+    grid = vp.Grid((0, 0, 0), (0.5, 0.25, 1), (50, 44, 45))
+    for where in (grid, grid.crop((3, 5, 9), (45, 33, 28))):
+        status, expected = {}, {}
+        lists = vp.sparse_fractions([outer, inner], where, of=names, status=status)
+        dense = vp.fractions([outer, inner], where, of=names, status=expected)
+        assert isinstance(lists, vp.SparseFractions) and status == expected
+        assert type(lists.voxels) is vp.VoxelList and lists.voxels.dtype == lists.cubes.dtype == np.int32
+        assert list(lists.values) == list(lists.cube_values) == names
+        for name in names:
+            found = opened(lists, where, name)
+            assert found.dtype == dense[name].dtype and found.tobytes() == dense[name].tobytes(), name
+            assert len(lists.cube_values[name]) == len(lists.cubes)
+        assert set(lists.cubes[:, 3]) >= {8, 16} and set(lists.cube_values["fraction"]) == {1, 2}
+        assert not lists.cube_values["area"].any() and not lists.cube_values["centroid"].any()
+        alone = vp.sparse_fractions([outer, inner], where, threads=1)
+        assert opened(alone, where, "fraction").tobytes() == dense["fraction"].tobytes()
+
+
+def test_lists_of_bodies_and_of_open_and_empty_meshes():
+    a, b = box((0.5, 0.25, 1), (6, 4.6, 8)), box((1.5, 1, 2), (5, 4, 8.5))
+    each = vp.sparse_fractions([a, b], GRID, bodies="each", of=("centroid", "fraction"))
+    dense = vp.fractions([a, b], GRID, bodies="each", of=("centroid", "fraction"))
+    assert len(each) == 2
+    for body, lists in enumerate(each):
+        assert list(lists.values) == ["centroid", "fraction"]
+        for name in lists.values:
+            assert opened(lists, GRID, name).tobytes() == dense[name][body].tobytes()
+    vertices, triangles = box((0.625, 0.375, 1.25), (3.875, 3.0625, 6.5))
+    open_box, status = (vertices, np.delete(triangles, 8, axis=0)), {}
+    with pytest.warns(vp.OpenMeshWarning, match=r" of 280 rows"):
+        lists = vp.sparse_fractions(open_box, GRID, status=status)
+    assert status["open_rows"] > 0 and status["open_edges"] == 3
+    closed = vp.sparse_fractions(open_box, GRID, repair="close_holes", status=status)
+    assert status["cones"] == 1 and status["open_edges"] == 0
+    assert opened(closed, GRID, "fraction").tobytes() == vp.fractions(open_box, GRID, repair="close_holes").tobytes()
+    assert not np.array_equal(opened(closed, GRID, "fraction"), opened(lists, GRID, "fraction"))
+    none = vp.sparse_fractions((np.zeros((0, 3)), np.zeros((0, 3), int)), GRID, of=("area", "area_centroid"))
+    assert none.voxels.shape == (0, 3) and none.cubes.shape == (0, 4)
+    assert none.values["area"].shape == (0,) and none.cube_values["area_centroid"].shape == (0, 3)
+
+
+def test_lists_of_a_grid_that_does_not_fit_densely():
+    # 2^60 voxels, of which 24 by 24 by 24 and their sides are listed.
+    grid = vp.Grid((0, 0, 0), (1, 1, 1), (1 << 20, 1 << 20, 1 << 20))
+    corner = np.array((500_000, 8_000, 1_000_000))
+    lists = vp.sparse_fractions(box(corner + 0.25, corner + 24.5), grid, of=("fraction", "area"))
+    volume = lists.values["fraction"].sum(dtype=np.float64)
+    volume += (lists.cube_values["fraction"] * lists.cubes[:, 3].astype(np.float64) ** 3).sum()
+    assert volume == 24.25**3  # in units of 1/8: positions beyond 2^19 have 5 bits after the point
+    assert lists.values["area"].sum() == 6 * 24.25**2 and len(lists.voxels) < 25**3 and len(lists.cubes) > 0
+    assert lists.voxels.min(axis=0).tolist() == corner.tolist() and lists.voxels.max(axis=0).tolist() == (corner + 24).tolist()
+
+
+def test_mistakes_of_lists_are_named():
+    mesh = box((1, 1, 1), (2, 2, 2))
+    for mistake in ("aperture_x", ("fraction", "area_vector"), ()):
+        with pytest.raises(ValueError, match="of "):
+            vp.sparse_fractions(mesh, GRID, of=mistake)
+    with pytest.raises(ValueError, match="bodies"):
+        vp.sparse_fractions(mesh, GRID, bodies="some")
+    with pytest.raises(ValueError, match="repair"):
+        vp.sparse_fractions(mesh, GRID, repair="vote")
+    with pytest.raises(TypeError, match=r"sparse_fractions\(mesh, fit\(mesh, 64\)\)"):
+        vp.sparse_fractions(mesh, 64)
+    with pytest.raises(IndexError):
+        vp.sparse_fractions((mesh[0], [(0, 1, 99)]), GRID)

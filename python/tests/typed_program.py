@@ -21,6 +21,8 @@ def occupied(vertices: Array, triangles: npt.NDArray[np.int64]) -> int:
     field: npt.NDArray[np.float32] = vp.distance(mesh, grid, "whole", corners=True)
     parts: npt.NDArray[np.float32] = vp.fractions(mesh, grid)
     cells: dict[str, npt.NDArray[np.float64]] = vp.fractions(mesh, grid, of=("aperture_x", "area_vector"))
+    cut: vp.SparseFractions = vp.sparse_fractions(mesh, grid, of=("fraction", "area"))
+    bodies: list[vp.SparseFractions] = vp.sparse_fractions([mesh, mesh], grid, bodies="each")
     walls: vp.Links = vp.links(mesh, grid, 26)
     labels, components = vp.label(parts > 0, 26, components=True)
     baked: dict[str, npt.NDArray[np.uint8]] = vp.bake("lighthouse.glb", grid)
@@ -29,7 +31,7 @@ def occupied(vertices: Array, triangles: npt.NDArray[np.int64]) -> int:
     listed: vp.VoxelList = voxels
     surface[grid.zyx(listed)] = True
     vp.save("a.vox", (voxels, attributes), grid, up="z", merge=True)
-    del words, picture, lists, field, parts, cells, walls, labels, components, baked
+    del words, picture, lists, field, parts, cells, cut, bodies, walls, labels, components, baked
     return shape[0]
 
 
@@ -40,6 +42,7 @@ def mistakes(vertices: Array, triangles: npt.NDArray[np.int64], grid: vp.Grid) -
     vp.solid(mesh, grid, repair="holes")  # type: ignore[call-overload]
     vp.fractions(mesh, grid, of="aperture")  # type: ignore[arg-type]
     vp.fractions(mesh, grid, repair="vote")  # type: ignore[call-overload]
+    vp.sparse_fractions(mesh, grid, of="aperture_x")  # type: ignore[arg-type]
     vp.voxelize(5, grid)  # type: ignore[call-overload]
     vp.save("a.npy", vp.voxelize(mesh, grid), grid, nonsense=1)  # type: ignore[call-arg]
     vp.bake(mesh, grid, {"rgb": vertices}, blend="median")  # type: ignore[call-overload]

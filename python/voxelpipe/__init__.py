@@ -25,7 +25,7 @@ from ._bake import bake, sparse
 from ._core import Grid
 from ._distance import distance, distance_at
 from ._fit import fit
-from ._fractions import fractions
+from ._fractions import SparseFractions, fractions, sparse_fractions
 from ._label import label
 from ._links import Links, links
 from ._model import Material, Model, ModelWarning, Part, Texture, load_model
@@ -54,6 +54,7 @@ __all__ = [
     "Octree",
     "OpenMeshWarning",
     "Part",
+    "SparseFractions",
     "Texture",
     "View",
     "VoxelList",
@@ -78,6 +79,7 @@ __all__ = [
     "save",
     "solid",
     "sparse",
+    "sparse_fractions",
     "tiles",
     "view",
     "voxelize",

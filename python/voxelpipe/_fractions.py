@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any, Sequence, overload
+from typing import Any, Literal, NamedTuple, Sequence, overload
 
 import numpy as np
 
@@ -11,8 +11,17 @@ from . import _core
 from ._core import Grid
 from ._distance import _host_mesh
 from ._solid import OpenMeshWarning
-from ._surface import take_counts
-from ._types import Bodies, CellValue, HoleRepair, MeshLike, check_call, check_choice, whole_number
+from ._surface import listed_for, take_counts
+from ._types import (
+    Bodies,
+    CellValue,
+    HoleRepair,
+    ListedCellValue,
+    MeshLike,
+    check_call,
+    check_choice,
+    whole_number,
+)
 
 _APERTURES = ("aperture_x", "aperture_y", "aperture_z")
 # What is measured within a voxel, in the order of the call: the type and the shape of a voxel's values.
@@ -22,6 +31,38 @@ _WITHIN: dict[str, tuple[Any, tuple[int, ...]]] = {
     "area_centroid": (np.float32, (3,)),
     "multi_cut": (np.bool_, ()),
 }
+
+
+def _checked(call: str, grid: Any, of: Any, names: Any, bodies: Any, repair: Any, max_hole_edges: Any,
+             threads: Any, status: Any) -> list[Any]:  # fmt: skip
+    """The names of `of`, each of which is one of a Literal. Raises ValueError or TypeError that names the argument."""
+    check_call(call, grid, "conservative", threads, status)
+    check_choice("bodies", bodies, Bodies)
+    check_choice("repair", repair, HoleRepair)
+    if max_hole_edges is not None:
+        whole_number("max_hole_edges", max_hole_edges)
+    wanted = [of] if isinstance(of, str) else list(of)
+    for name in wanted:
+        check_choice("of", name, names)
+    if not wanted:
+        raise ValueError("of names nothing to measure")
+    return wanted
+
+
+def _parts(m: Any, bodies: str) -> list[tuple[int, int]]:
+    """First triangle and the one after the last of every body that has fractions of its own."""
+    firsts = list(m.first_triangles) if bodies == "each" else [0]
+    return list(zip(firsts, firsts[1:] + [len(m.triangles)]))
+
+
+def _warn_if_open(counts: dict[str, int], rows: int) -> None:
+    if counts["open_rows"]:
+        warnings.warn(
+            f"the mesh is not closed: {counts['open_rows']} of {rows} rows of voxels do not balance, and the fractions "
+            f"behind a hole are in doubt ({counts['open_edges']} open edges)",
+            OpenMeshWarning,
+            stacklevel=3,
+        )
 
 
 @overload
@@ -106,37 +147,27 @@ def fractions(
         >>> cells = vp.fractions(mesh, grid, of=("fraction", "aperture_x", "area_vector"))
         >>> area = np.linalg.norm(cells["area_vector"], axis=-1)  # of one plane a voxel
     """
-    check_call("fractions", grid, "conservative", threads, status)
-    check_choice("bodies", bodies, Bodies)
-    check_choice("repair", repair, HoleRepair)
-    if max_hole_edges is not None:
-        whole_number("max_hole_edges", max_hole_edges)
-    wanted = [of] if isinstance(of, str) else list(of)
-    for name in wanted:
-        check_choice("of", name, CellValue)
-    if not wanted:
-        raise ValueError("of names nothing to measure")
+    wanted = _checked("fractions", grid, of, CellValue, bodies, repair, max_hole_edges, threads, status)
     m = _host_mesh(mesh, "fractions")
     positions, where = m.positions(grid)
-    firsts = list(m.first_triangles) if bodies == "each" else [0]
-    ends = firsts[1:] + [len(m.triangles)]
+    parts = _parts(m, bodies)
     has_areas = "area_vector" in wanted
     # Rows along x come last: the fractions and the counters are theirs.
     axes = [axis for axis in (2, 1) if has_areas or _APERTURES[axis] in wanted] + [0]
-    out: dict[str, np.ndarray] = {"fraction": np.empty((len(firsts), *grid.shape), np.float32)}
+    out: dict[str, np.ndarray] = {"fraction": np.empty((len(parts), *grid.shape), np.float32)}
     if has_areas:
-        out["area_vector"] = np.zeros((len(firsts), *grid.shape, 3))
+        out["area_vector"] = np.zeros((len(parts), *grid.shape, 3))
     for axis, faces in enumerate(_APERTURES):
         if faces in wanted:
             shape = list(grid.shape)
             shape[2 - axis] += 1
-            out[faces] = np.zeros((len(firsts), *shape))
+            out[faces] = np.zeros((len(parts), *shape))
     for part, (scalar, tail) in _WITHIN.items():
         if part in wanted:
-            out[part] = np.zeros((len(firsts), *grid.shape, *tail), scalar)
+            out[part] = np.zeros((len(parts), *grid.shape, *tail), scalar)
     counts: dict[str, int] = {}
     open_rows = rows = 0
-    for body, (first, end) in enumerate(zip(firsts, ends)):
+    for body, (first, end) in enumerate(parts):
         for axis in axes:
             within = [out[part][body] if part in out and axis == 0 else None for part in _WITHIN]
             of_body = _core.fractions(
@@ -160,12 +191,109 @@ def fractions(
         counts = {name: counts.get(name, 0) + count for name, count in of_body.items()}
     counts["open_rows"] = open_rows
     take_counts(counts, status)
-    if open_rows:
-        warnings.warn(
-            f"the mesh is not closed: {open_rows} of {rows} rows of voxels do not balance, and the fractions behind a "
-            f"hole are in doubt ({counts['open_edges']} open edges)",
-            OpenMeshWarning,
-            stacklevel=2,
-        )
+    _warn_if_open(counts, rows)
     results = {name: m.to_caller(out[name] if bodies == "each" else out[name][0]) for name in wanted}
     return results[of] if isinstance(of, str) else results
+
+
+class SparseFractions(NamedTuple):
+    """How much of each voxel is inside, as lists: memory in proportion to the surface. All other voxels are outside."""
+
+    voxels: Any
+    """(n, 3) int32, a VoxelList: x, y, z of each voxel that is cut or inside and in no cube, in Morton order"""
+    values: dict[str, Any]
+    """by name a row for each of them, with the types that fractions() has: "fraction" is float32, (n,)"""
+    cubes: Any
+    """(m, 4) int32: the first voxel x, y, z of a cube of voxels that have all values in common, and its side in voxels, 8,
+    16, 32 and so on: what no triangle touches within closed meshes"""
+    cube_values: dict[str, Any]
+    """by name a row for each cube"""
+
+
+@overload
+def sparse_fractions(
+    mesh: MeshLike,
+    grid: Grid,
+    *,
+    of: ListedCellValue | Sequence[ListedCellValue] = "fraction",
+    bodies: Literal["all"] = "all",
+    repair: HoleRepair = "none",
+    max_hole_edges: int | None = None,
+    threads: int = 0,
+    status: dict[str, int] | None = None,
+) -> SparseFractions: ...
+
+
+@overload
+def sparse_fractions(
+    mesh: MeshLike,
+    grid: Grid,
+    *,
+    of: ListedCellValue | Sequence[ListedCellValue] = "fraction",
+    bodies: Literal["each"],
+    repair: HoleRepair = "none",
+    max_hole_edges: int | None = None,
+    threads: int = 0,
+    status: dict[str, int] | None = None,
+) -> list[SparseFractions]: ...
+
+
+def sparse_fractions(
+    mesh: MeshLike,
+    grid: Grid,
+    *,
+    of: ListedCellValue | Sequence[ListedCellValue] = "fraction",
+    bodies: Bodies = "all",
+    repair: HoleRepair = "none",
+    max_hole_edges: int | None = None,
+    threads: int = 0,
+    status: dict[str, int] | None = None,
+) -> SparseFractions | list[SparseFractions]:
+    """How much of every voxel is inside, as voxels and cubes of voxels: the values of fractions(), bit for bit, in memory
+    and time in proportion to the surface, for grids of up to 2^20 voxels an axis.
+
+    Args:
+        mesh, grid: as in voxelize(). The meshes of a list, and the parts of a model, are bodies.
+        of: what is listed, one name or a list of names of fractions(): "fraction", "centroid", "area", "area_centroid",
+            "multi_cut". Faces and area vectors are those of dense grids alone.
+        bodies: "all", the sum over all bodies; "each", a result for every body by itself, in their order.
+        repair, max_hole_edges, threads, status: as in fractions().
+
+    Returns:
+        SparseFractions(voxels, values, cubes, cube_values), with "each" a list of them. A voxel is listed, or lies in a
+        cube, if a triangle cuts it or its fraction is not 0. A mesh of torch's tensors gives tensors.
+
+    Warns and raises as fractions() does. Raises MemoryError where the lists do not fit.
+
+    Example:
+        >>> grid = vp.fit(mesh, 4096)
+        >>> cells = vp.sparse_fractions(mesh, grid, of=("fraction", "area"))
+        >>> inside = cells.values["fraction"].sum(dtype=np.float64)  # in voxels
+        >>> inside += (cells.cube_values["fraction"] * cells.cubes[:, 3].astype(np.float64) ** 3).sum()
+    """
+    wanted = _checked(
+        "sparse_fractions", grid, of, ListedCellValue, bodies, repair, max_hole_edges, threads, status
+    )
+    m = _host_mesh(mesh, "fractions")
+    positions, where = m.positions(grid)
+    counts: dict[str, int] = {}
+    results = []
+    for first, end in _parts(m, bodies):
+        voxels, values, cubes, cube_values, of_body = _core.sparse_fractions(
+            positions, m.triangles[first:end], where, wanted, repair == "close_holes", max_hole_edges, threads
+        )
+        for rows in (values, cube_values):
+            for name in wanted:
+                rows[name] = m.to_caller(rows[name].view(np.bool_) if name == "multi_cut" else rows[name])
+        results.append(
+            SparseFractions(
+                listed_for(m, voxels),
+                {name: values[name] for name in wanted},
+                m.to_caller(cubes),
+                {name: cube_values[name] for name in wanted},
+            )
+        )
+        counts = {name: counts.get(name, 0) + count for name, count in of_body.items()}
+    take_counts(counts, status)
+    _warn_if_open(counts, len(results) * grid.shape[0] * grid.shape[1])
+    return results if bodies == "each" else results[0]

@@ -33,6 +33,8 @@ CellValue = Literal[
     "area_centroid",
     "multi_cut",
 ]
+# What sparse_fractions() lists of voxels.
+ListedCellValue = Literal["fraction", "centroid", "area", "area_centroid", "multi_cut"]
 Place = Literal["corner", "mean", "sharp"]
 Border = Literal["closed", "open"]
 Blend = Literal["mean", "sum", "min", "max", "last"]

@@ -6,7 +6,7 @@
 // point sends a few of a set of cones over its hemisphere; its neighbours send the others, and a mean over the
 // neighbours has them all.
 
-#include "world.hpp"
+#include "rays.hpp"
 
 #include <cmath>
 #include <numbers>
@@ -91,20 +91,49 @@ struct cone {
     return result;
 }
 
+// Any two vectors across a normal that turn with it continuously around most of the sphere.
+struct tangents {
+    glm::vec3 p, q;
+};
+[[nodiscard]] VOXELPIPE_HD inline tangents tangents_of(const glm::vec3& normal) {
+    const glm::vec3 other = normal.y > -0.9f && normal.y < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
+    const glm::vec3 c = glm::cross(normal, other), p = c / vp::exact::sqrt(glm::dot(c, c));
+    return {p, glm::cross(p, normal)};
+}
+// A voxel, and a sample of its width, reach farther along a normal that is no axis: by the sum of its components. With
+// one height for all normals, samples over a wall that is turned meet its steps, in stripes.
+[[nodiscard]] VOXELPIPE_HD inline float reach_of(const glm::vec3& normal) {
+    return (normal.x < 0.0f ? -normal.x : normal.x) + (normal.y < 0.0f ? -normal.y : normal.y) +
+           (normal.z < 0.0f ? -normal.z : normal.z);
+}
+// Where the cones of a surface's point start.
+[[nodiscard]] VOXELPIPE_HD inline glm::vec3 start_over(const glm::vec3& at, const glm::vec3& normal, float narrowest) {
+    return at + normal * (1.3f * narrowest * reach_of(normal));
+}
+// The way from there that the cones of settings::thorough start at: off walls beside the point, up to the height over
+// its own surface. Samples next to a wall read its voxels from within, which are dark, whatever light the wall has:
+// corners would be black seams.
+[[nodiscard]] VOXELPIPE_HD inline glm::vec3 off_walls(const world& w, const triangle_lists& lists, const glm::vec3& at,
+                                                      const glm::vec3& normal, float narrowest) {
+    const tangents t = tangents_of(normal);
+    const glm::vec3 from = start_over(at, normal, narrowest);
+    const float room = 1.3f * narrowest * reach_of(normal);
+    // Between two walls the ways cancel.
+    return t.p * (lists.trace(w, from, t.p, room, false).distance - lists.trace(w, from, -t.p, room, false).distance) +
+           t.q * (lists.trace(w, from, t.q, room, false).distance - lists.trace(w, from, -t.q, room, false).distance);
+}
+
 // The mean of a phase's cones: irradiance / pi, and occlusion, as far as this phase knows them.
 [[nodiscard]] VOXELPIPE_HD inline cone_light gather(const vp::direction_mips_view& mips, const world& w,
                                                     const cone_set& set, int phase, const glm::vec3& at,
-                                                    const glm::vec3& normal, float narrowest) {
-    // Any two vectors across the normal that turn with it continuously around most of the sphere.
-    const glm::vec3 other = normal.y > -0.9f && normal.y < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
-    const glm::vec3 c = glm::cross(normal, other);
-    const glm::vec3 p = c / vp::exact::sqrt(glm::dot(c, c)), q = glm::cross(p, normal);
-    // A voxel, and a sample of its width, reach farther along a normal that is no axis: by the sum of its components.
-    // With one height for all normals, samples over a wall that is turned meet its steps, in stripes.
-    const float reach = (normal.x < 0.0f ? -normal.x : normal.x) + (normal.y < 0.0f ? -normal.y : normal.y) +
-                        (normal.z < 0.0f ? -normal.z : normal.z);
+                                                    const glm::vec3& normal, float narrowest,
+                                                    const glm::vec3* moved = nullptr) {
+    const tangents t = tangents_of(normal);
+    const glm::vec3 p = t.p, q = t.q;
+    const float reach = reach_of(normal);
     cone_light sum;
-    const glm::vec3 from = at + normal * (1.3f * narrowest * reach);
+    glm::vec3 from = start_over(at, normal, narrowest);
+    if (moved != nullptr) from = from + *moved;
     for (int i = phase; i < set.count; i += set.phases) {
         const glm::vec3 d = set.directions[i];
         const cone_light l = trace_cone(mips, w,

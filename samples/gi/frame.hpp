@@ -61,10 +61,15 @@ public:
           filled_(backend_, coarse_.extent), irradiances_(backend_, std::size_t{0}), lit_(backend_, std::size_t{0}),
           gathered_(backend_, std::size_t{0}), seen_(backend_, num_rays(how)), near_(backend_, num_rays(how)),
           received_(backend_, num_rays(how)), mirrored_(backend_, num_rays(how)),
+          moved_(backend_, how.thorough ? num_rays(how) : 0), voxels_moved_(backend_, std::size_t{0}),
           pixels_(backend_, static_cast<std::size_t>(how.width) * static_cast<std::size_t>(how.height)) {
         upload_textures();
         checked_ = vp::check_indices(backend_, triangles_.view());
         how_.level = std::min(how_.level, mips_.view().last_level);
+        if (how_.thorough) {
+            voxel_cones_ = make_cone_set(8, 1);
+            pixel_cones_ = make_cone_set(64, eye_rays::num_phases);
+        }
     }
 
     [[nodiscard]] frame render(double time) override {
@@ -81,7 +86,7 @@ public:
         light_voxels(w);
         watch_.end("light");
         // The first frame has no last one: light bounces a few times within it.
-        const int rounds = has_last_ ? 1 : 4;
+        const int rounds = has_last_ ? 1 : how_.thorough ? 6 : 4;
         for (int i = 0; i < rounds; ++i) {
             bounce(w);
             watch_.end("bounce");
@@ -175,7 +180,10 @@ private:
         blockers_.build(backend_, vp::bit_rows{bits()});
         tracer<Backend>::run(backend_, lists_.num_fragments(),
                              light_fragments{w, lists_view(), blockers_.view(), irradiances_.data()});
-        backend_.for_each(n, fold_fragments{w, lists_view(), irradiances_.data(), lit_.data()});
+        backend_.for_each(n, fold_fragments{w, lists_view(), bits(), irradiances_.data(), lit_.data()});
+        if (!how_.thorough) return;
+        if (voxels_moved_.size() < n) voxels_moved_ = buffer<glm::vec3>(backend_, n + n / 8);
+        tracer<Backend>::run(backend_, n, find_voxel_walls{w, lists_view(), lit_.data(), voxels_moved_.data()});
     }
     // Light of this frame's voxels, with what the last frame's send there.
     void bounce(const world& w) {
@@ -184,7 +192,8 @@ private:
         const std::size_t n = lists_.num_voxels();
         if (has_last_)
             tracer<Backend>::run(backend_, n,
-                                 gather_voxels{w, lists, last_.view(), voxel_cones_, lit_.data(), gathered_.data()});
+                                 gather_voxels{w, lists, last_.view(), voxel_cones_, lit_.data(),
+                                               how_.thorough ? voxels_moved_.data() : nullptr, gathered_.data()});
         backend_.for_each(n, light_surfaces{lists, bits(), lit_.data(), has_last_ ? gathered_.data() : nullptr,
                                             mips_.finest(), mips_.facings()});
         backend_.for_each(mips_.view().num_voxels(0),
@@ -201,16 +210,21 @@ private:
         }
         const triangle_lists lists = lists_view();
         const ray_order order(rays);
-        const ray_data data{seen_.data(), near_.data(), received_.data(), mirrored_.data()};
+        const ray_data data{seen_.data(), near_.data(), received_.data(), mirrored_.data(),
+                            how_.thorough ? moved_.data() : nullptr};
         const auto trace = [&](const auto& pass) { tracer<Backend>::run(backend_, order.count(), pass); };
         const view_choice view = how_.view;
         trace(see_points{w, lists, rays, order, data});
-        if (view == view_choice::final || view == view_choice::direct) trace(see_light{w, lists, order, data});
+        if (view == view_choice::final || view == view_choice::direct)
+            trace(see_light{w, lists, order, how_.thorough ? 4u : 1u, data});
         watch_.end("rays");
+        if (how_.thorough && view != view_choice::direct) trace(find_walls{w, lists, order, data});
         if (view != view_choice::direct)
             trace(receive_light{w, mips_.view(), order, view == view_choice::ao, pixel_cones_, data});
+        world shiny = w; // reflections have one cone, whose samples overlap more
+        shiny.shape = cone_shape{};
         if (view == view_choice::final || view == view_choice::indirect)
-            trace(receive_mirrored{w, mips_.view(), rays, order, data});
+            trace(receive_mirrored{shiny, mips_.view(), rays, order, data});
         watch_.end("cones");
         backend_.for_each(pixels_.size(),
                           draw_pixels{w, rays, view, how_.samples, scene_.exposure, order, data, pixels_.data()});
@@ -243,6 +257,10 @@ private:
             w.light.side_v *= scale;
         }
         if (scene_.wall > 0) w.shape.widest = std::max(4.0f, static_cast<float>(2.0 * scene_.wall * per_unit_));
+        if (how_.thorough) { // what lies between narrow cones is closed by the others, so each may close less
+            w.shape.overlap = 1.5f;
+            w.shape.weight = 0.9f;
+        }
         w.sky_above = scene_.sky_above;
         w.sky_level = scene_.sky_level;
         return w;
@@ -294,6 +312,7 @@ private:
     buffer<near_point> near_;
     buffer<received_light> received_;
     buffer<glm::vec3> mirrored_;
+    buffer<glm::vec3> moved_, voxels_moved_; // of settings::thorough
     buffer<glm::u8vec4> pixels_;
 };
 

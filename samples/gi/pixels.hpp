@@ -77,6 +77,7 @@ struct ray_data {
     near_point* near;
     received_light* received;
     glm::vec3* mirrored;
+    glm::vec3* moved; // of off_walls; null: cones start over their point
 };
 
 struct see_points {
@@ -120,6 +121,7 @@ struct see_light {
     gi::world world;
     triangle_lists lists;
     ray_order order;
+    std::uint32_t finer; // times as many rays
     ray_data data;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
@@ -130,7 +132,7 @@ struct see_light {
         const glm::vec3 position = data.near[ray].position, normal = data.seen[ray].normal;
         const std::uint32_t noise =
             static_cast<std::uint32_t>(at.x) * 0x9e3779b9u ^ static_cast<std::uint32_t>(at.y) * 0x85ebca6bu;
-        const std::uint32_t count = world.light.position.w == 0.0f ? 1 : 2;
+        const std::uint32_t count = (world.light.position.w == 0.0f ? 1 : 2) * finer;
         float all = 0.0f, seen = 0.0f;
         for (std::uint32_t k = 0; k < count; ++k) {
             const float within = (static_cast<float>(k) + noise_of(noise + 2 * k + 1)) / static_cast<float>(count);
@@ -142,6 +144,23 @@ struct see_light {
             if (!lists.blocks(world, position + normal * 0.12f, l.direction, l.distance - 0.6f)) seen = seen + l.part;
         }
         data.received[ray].visible = all > 0.0f ? seen / all : -1.0f;
+    }
+};
+
+constexpr float pixel_cone_width = 1.5f; // finer samples show the steps of walls that stand aslant as stripes
+
+struct find_walls {
+    gi::world world;
+    triangle_lists lists;
+    ray_order order;
+    ray_data data;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        glm::ivec2 at;
+        if (!order.place(i, false, at)) return;
+        const std::size_t ray = order.index(at);
+        if (data.near[ray].facing == 0) return;
+        data.moved[ray] = off_walls(world, lists, data.near[ray].position, data.seen[ray].normal, pixel_cone_width);
     }
 };
 
@@ -158,9 +177,9 @@ struct receive_light {
         if (!order.place(i, true, at)) return;
         const std::size_t ray = order.index(at);
         if (data.near[ray].facing == 0) return;
-        // From 1.5 voxels on: finer samples show the steps of the voxels of walls that stand aslant as stripes.
-        const cone_light around = gather(mips, world, cones, eye_rays::phase(at.x, at.y), data.near[ray].position,
-                                         data.seen[ray].normal, 1.5f);
+        const cone_light around =
+            gather(mips, world, cones, eye_rays::phase(at.x, at.y), data.near[ray].position, data.seen[ray].normal,
+                   pixel_cone_width, data.moved != nullptr ? data.moved + ray : nullptr);
         data.received[ray].diffuse = wants_occlusion ? glm::vec3(around.occlusion) : around.light;
     }
 };
@@ -308,7 +327,13 @@ struct draw_level {
                            const int towards = 2 * at.axis + (at.from_above ? 1 : 0);
                            glm::vec4 v = p.mips.fetch(p.level, towards, at.cell);
                            if (!(v.w > 0.06f)) return false;
-                           // A voxel that is lit on other sides alone shows one of those: black would look like a hole.
+                           // Light leaves on the side of a voxel's normal. The others show half of it, those of larger
+                           // voxels what another side has: black would look like a hole.
+                           if (p.level == 0) {
+                               const std::size_t i = vp::direction_mips_view::index(p.mips.extent, at.cell);
+                               const glm::vec4 all = vp::unpack_light(p.mips.finest[i]) * 0.5f;
+                               if (v.x + v.y + v.z < all.x + all.y + all.z) v = glm::vec4(glm::vec3(all), v.w);
+                           }
                            for (int side = 0; side < 6 && v.x + v.y + v.z == 0.0f; ++side) {
                                const glm::vec4 other = p.mips.fetch(p.level, side, at.cell);
                                if (other.w > 0.06f) v = other;

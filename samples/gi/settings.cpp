@@ -66,6 +66,7 @@ settings parse_command_line(int argc, const char* const* argv) {
     app.add_option("--round", s.round, "frames of a whole round")->capture_default_str();
     app.add_option("--samples", s.samples, "rays a side of a pixel: 2 is 4 a pixel")->capture_default_str();
     app.add_flag("--still", s.still, "nothing moves, every frame stands at --start");
+    app.add_flag("--thorough", s.thorough, "more cones and bounces, no dark seams in corners: for pictures, not films");
     app.add_option("--backend", backend, "auto, cpu or cuda; the pictures are the same")->capture_default_str();
     app.add_option("--threads", s.threads, "0: one for each core")->capture_default_str();
     app.add_flag("--window", s.window, "show it in a window instead, until that is closed");

@@ -28,6 +28,9 @@ struct settings {
     int level = 0;      // of view_choice::level
     int samples = 1;    // a side of a pixel
     bool still = false; // nothing moves
+    // All cones at every voxel, more and narrower ones at every pixel, none that starts within a wall beside it, and
+    // light that bounces more often: for pictures, which may take longer than frames of a film.
+    bool thorough = false;
     backend_choice backend = backend_choice::automatic;
     unsigned threads = 0; // of the CPU; 0: one for each core
     bool stats = false, quiet = false, window = false;

@@ -23,6 +23,7 @@ struct lit_voxel {
     glm::vec3 normal{0.0f}; // unit, or 0
     float density = 0;      // the largest; 0: all fragments are cut off
     bool has_side = false;  // its fragments face one way
+    bool two_sided = false; // they face all ways, so that none is the voxel's: `normal` is one of two opposite ones
 };
 
 // The density times the share of a voxel's eighths that are filled, so that nothing jumps when a surface moves.
@@ -57,10 +58,13 @@ struct light_fragments {
     }
 };
 
-// Number i of the voxels with triangles: the means of its fragments, in the order of the list.
+// Number i of the voxels with triangles: the means of its fragments, in the order of the list. A fragment that other
+// closed parts cover, as the foot of a column and the floor under it, counts where nothing else does: it is dark, and
+// its normal may cancel that of what is seen.
 struct fold_fragments {
     gi::world world;
     triangle_lists lists;
+    vp::dense_bits bits;      // at twice the resolution
     const float* irradiances; // of light_fragments
     lit_voxel* out;
 
@@ -70,13 +74,18 @@ struct fold_fragments {
         for (std::uint64_t k = lists.offsets[i]; k < lists.offsets[i + 1]; ++k) {
             const surface s = lists.fragment(world, k);
             if (s.cut) continue;
+            const glm::vec3 over = (s.position + s.normal) * 2.0f;
+            const bool covered =
+                s.density <= 1.0f && over.x >= 0.0f && over.y >= 0.0f && over.z >= 0.0f && bits(glm::ivec3(over));
+            const float weight = covered ? 0x1p-10f : 1.0f;
             const glm::vec3 diffuse = s.color * (1.0f - 0.7f * s.metallic); // what a metal reflects blurs here
-            sum.light = sum.light + diffuse * world.light.color * (irradiances[k] * (1.0f / 3.14159265f));
-            if (!s.is_light) sum.light = sum.light + s.emission;
-            sum.color = sum.color + diffuse;
-            sum.normal = sum.normal + s.normal;
+            glm::vec3 light = diffuse * world.light.color * (irradiances[k] * (1.0f / 3.14159265f));
+            if (!s.is_light) light = light + s.emission;
+            sum.light = sum.light + light * weight;
+            sum.color = sum.color + diffuse * weight;
+            sum.normal = sum.normal + s.normal * weight;
             sum.density = s.density > sum.density ? s.density : sum.density;
-            count = count + 1.0f;
+            count = count + weight;
         }
         if (count > 0.0f) {
             const float part = 1.0f / count;
@@ -84,7 +93,10 @@ struct fold_fragments {
             sum.light = sum.light * part;
             sum.color = sum.color * part;
             sum.has_side = sum.density <= 1.0f && length > 0.3f * count;
-            sum.normal = length > 0.0f ? sum.normal / length : glm::vec3(0.0f);
+            // What is covered on all sides takes no light: it would shine into the rooms on both sides of a thin wall.
+            const bool faces = length > 0.02f * count, seen = count >= 1.0f;
+            sum.two_sided = sum.density > 1.0f || !faces;
+            sum.normal = faces ? sum.normal / length : seen ? glm::vec3(0, 1, 0) : glm::vec3(0.0f);
         }
         out[i] = sum;
     }
@@ -95,12 +107,28 @@ struct gathered {
     glm::vec3 light{0.0f};
     std::uint32_t facing = 0; // of its normal
 };
+constexpr float voxel_cone_width = 2.0f;
+
+struct find_voxel_walls {
+    gi::world world;
+    triangle_lists lists;
+    const lit_voxel* voxels;
+    glm::vec3* moved;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (voxels[i].normal == glm::vec3(0.0f)) return; // sends no cone
+        const glm::vec3 at = glm::vec3(lists.voxel(lists.voxels[i])) + 0.5f;
+        moved[i] = off_walls(world, lists, at, voxels[i].normal, voxel_cone_width);
+    }
+};
+
 struct gather_voxels {
     gi::world world;
     triangle_lists lists;
     vp::direction_mips_view last;
-    cone_set cones; // of 8 phases
+    cone_set cones; // of 8 phases, or of one
     const lit_voxel* voxels;
+    const glm::vec3* moved; // of off_walls; null: cones start over their voxel
     gathered* out;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
@@ -108,11 +136,14 @@ struct gather_voxels {
         gathered g;
         if (voxel.normal != glm::vec3(0.0f)) {
             const glm::ivec3 v = lists.voxel(lists.voxels[i]);
-            const int phase = (v.x & 1) + 2 * (v.y & 1) + 4 * (v.z & 1);
+            const int phase = cones.phases == 1 ? 0 : (v.x & 1) + 2 * (v.y & 1) + 4 * (v.z & 1);
             const glm::vec3 at = glm::vec3(v) + 0.5f;
-            g.light = gather(last, world, cones, phase, at, voxel.normal, 2.0f).light;
-            if (voxel.density > 1.0f)
-                g.light = (g.light + gather(last, world, cones, phase, at, -voxel.normal, 2.0f).light) * 0.5f;
+            g.light = gather(last, world, cones, phase, at, voxel.normal, voxel_cone_width,
+                             moved != nullptr ? moved + i : nullptr)
+                          .light;
+            if (voxel.two_sided)
+                g.light =
+                    (g.light + gather(last, world, cones, phase, at, -voxel.normal, voxel_cone_width).light) * 0.5f;
             g.facing = vp::pack_facing(voxel.normal);
         }
         out[i] = g;

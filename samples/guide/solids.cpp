@@ -3,7 +3,7 @@
 // Solids: the inside of parts that overlap, a material for each draw, and a mesh with a hole. Exits with 0 when the
 // counts are those of the boxes.
 #include <cpu_ref/backend.hpp>
-#include <voxelpipe/slabs/stream.hpp>
+#include <voxelpipe/slabs/stream_surface.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <cstdint>
@@ -106,5 +106,18 @@ int main() {
     // as `closed`, voxels and all counts, of slabs that never were in memory together
     // end snippet
     good = good && streamed.counts == closed.counts && streamed.solid == closed.solid && filled == closed.counts.voxels;
+
+    // snippet: surface
+    std::uint64_t vertices = 0;
+    slabs::stream again(backend, grid, vp::passthrough{}, {.num_slabs = 4, .repair = vp::repair::close_holes});
+    again.add(open).or_throw();
+    const vp::status meshed = slabs::extract_solid(
+        again, // `piece` goes to a file, and its memory to the next one
+        [&](const vp::surface_slab&, const vp::surface<vp::cpu_backend>& piece) { vertices += piece.vertices.size(); },
+        {}, {.repair = vp::repair::close_holes});
+    // end snippet
+    vp::surface<vp::cpu_backend> at_once{backend};
+    vp::extract(backend, inside, grid, at_once).or_throw();
+    good = good && meshed.ok() && vertices == at_once.vertices.size() && meshed.surface.vertices == vertices;
     return good ? 0 : 1;
 }

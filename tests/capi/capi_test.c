@@ -75,7 +75,7 @@ static int count(const uint8_t* mask, int n) {
 }
 
 /* The cube from 0.75 to 3.25 in 4 x 4 x 4 unit voxels: its sides lie in the outer layers, 8 voxels are within. */
-enum { N = 4, VOXELS = N * N * N };
+enum { N = 4, VOXELS = N * N * N, LINKS = 26 };
 
 static void surfaces_and_solids(vp_context* context, const vp_mesh* cube) {
     static const struct {
@@ -301,6 +301,62 @@ static void fractions(vp_context* context, const vp_mesh* cube) {
     CHECK(counters.volume == 15.625 && counters.open_edges == 0);
 }
 
+/* Two cubes as parts: the walls of the first lie between the centres of voxels 0 and 1, and of 2 and 3. */
+static void links(vp_context* context) {
+    static const uint64_t parts[2] = {0, 12};
+    float positions[16][3], q[LINKS * VOXELS];
+    uint32_t triangles[24][3];
+    const vp_grid grid = unit_grid(N);
+    vp_link_options options;
+    vp_counters counters;
+    vp_mesh* both;
+    vp_links* found = NULL;
+    uint64_t n = 0, i, crossed = 0;
+    uint32_t neighbours = 0, link, checked = 0;
+    int32_t coordinates[3 * VOXELS], part[LINKS * VOXELS], direction[3], back[3];
+    int64_t triangle[LINKS * VOXELS];
+    memset(&options, 0, sizeof options);
+    options.struct_size = sizeof options;
+    memset(&counters, 0, sizeof counters);
+    counters.struct_size = sizeof counters;
+    add_cube(positions, triangles, 0, 0.75f, 3.25f);
+    add_cube(positions, triangles, 1, 9.0f, 10.0f); /* beyond the grid */
+    both = make_mesh(context, positions, 16, triangles, 24, parts, 2);
+    OK(vp_links_create(context, both, &grid, NULL, &found, &counters));
+    OK(vp_links_size(found, &n, &neighbours));
+    CHECK(neighbours == 18 && n == counters.voxels && n > 8);
+    vp_links_destroy(found);
+    options.neighbours = LINKS;
+    OK(vp_links_create(context, both, &grid, &options, &found, &counters));
+    OK(vp_links_size(found, &n, &neighbours));
+    CHECK(neighbours == LINKS && n == VOXELS); /* every voxel has a neighbour across a wall */
+    OK(vp_links_read(found, 0, n, coordinates, q, triangle, part));
+    for (i = 0; i < n; ++i)
+        for (link = 0; link < LINKS; ++link) {
+            const uint64_t at = LINKS * i + link;
+            const int32_t* const p = &coordinates[3 * i];
+            OK(vp_link_direction((int32_t)link, direction));
+            OK(vp_link_direction((int32_t)(link ^ 1u), back));
+            CHECK(direction[0] == -back[0] && direction[1] == -back[1] && direction[2] == -back[2]);
+            crossed += q[at] > 0;
+            CHECK(q[at] > 0 ? part[at] == 0 && triangle[at] >= 0 && triangle[at] < 12
+                            : q[at] == -1 && part[at] == -1 && triangle[at] == -1);
+            if (p[1] != 1 || p[2] != 1 || direction[1] != 0 || direction[2] != 0) continue;
+            ++checked; /* along x through the cube */
+            CHECK(q[at] == (p[0] == 0 && direction[0] > 0   ? 0.25f
+                            : p[0] == 1 && direction[0] < 0 ? 0.75f
+                            : p[0] == 2 && direction[0] > 0 ? 0.75f
+                            : p[0] == 3 && direction[0] < 0 ? 0.25f
+                                                            : -1.0f));
+            if (q[at] == 0.25f && p[0] == 0) CHECK(triangle[at] == 8 || triangle[at] == 9);
+        }
+    CHECK(checked == 8 && crossed == counters.fragments);
+    OK(vp_links_read(found, n - 1, 1, coordinates, NULL, NULL, NULL));
+    CHECK(coordinates[0] == N - 1 && coordinates[1] == N - 1 && coordinates[2] == N - 1);
+    vp_links_destroy(found);
+    vp_mesh_destroy(both);
+}
+
 static void grids(vp_context* context, const vp_mesh* cube) {
     static const uint64_t extent[3] = {10, 20, 30};
     static const double size[3] = {0.5, 0.5, 0.25};
@@ -344,12 +400,14 @@ int main(void) {
     solid_list(context, cube);
     distances(context, cube);
     fractions(context, cube);
+    links(context);
     grids(context, cube);
     vp_mesh_destroy(cube);
     vp_context_destroy(context);
     vp_mesh_destroy(NULL);
     vp_context_destroy(NULL);
     vp_list_destroy(NULL);
+    vp_links_destroy(NULL);
     printf("%d failures\n", failures);
     return failures != 0;
 }

@@ -43,10 +43,10 @@ def structure(name):
     return lambda **members: made(struct_size=c.sizeof(made), **members)
 
 
-MeshDesc, Grid, Array, Counters, SurfaceOptions, SolidOptions, Rows, DistanceOptions, FractionOptions = map(
+MeshDesc, Grid, Array, Counters, SurfaceOptions, SolidOptions, Rows, DistanceOptions, FractionOptions, LinkOptions = map(
     structure,
     "vp_mesh_desc vp_grid vp_array vp_counters vp_surface_options vp_solid_options vp_rows vp_distance_options "
-    "vp_fraction_options".split(),
+    "vp_fraction_options vp_link_options".split(),
 )
 
 LOW, HIGH = 0.75, 3.25  # a cube among 4 x 4 x 4 voxels of size 1: capi_test.c has what it gives
@@ -124,8 +124,12 @@ class Api(unittest.TestCase):
         self.fails("NULL_HANDLE", "list", vp.vp_list_size(None, c.byref(c.c_uint64()), None))
         self.fails("WRONG_HANDLE", "list", vp.vp_list_size(self.cube, c.byref(c.c_uint64()), None))
         self.fails("NULL_POINTER", "list", vp.vp_solid_list(self.context, self.cube, c.byref(grid), None, None, None))
+        self.fails("NULL_HANDLE", "mesh", vp.vp_links_create(self.context, None, c.byref(grid), None, c.byref(other), None))
+        self.fails("NULL_POINTER", "links", vp.vp_links_create(self.context, self.cube, c.byref(grid), None, None, None))
+        self.fails("NULL_HANDLE", "links", vp.vp_links_size(None, c.byref(c.c_uint64()), None))
+        self.fails("WRONG_HANDLE", "links", vp.vp_links_read(self.cube, c.c_uint64(0), c.c_uint64(0), None, None, None, None))
         self.assertFalse(other)
-        for destroy in (vp.vp_mesh_destroy, vp.vp_list_destroy):
+        for destroy in (vp.vp_mesh_destroy, vp.vp_list_destroy, vp.vp_links_destroy):
             destroy(self.context)  # another kind: left alone
         self.ok(self.surface(out))
 
@@ -209,6 +213,15 @@ class Api(unittest.TestCase):
         self.fails("BAD_ARRAY", "point_stride", vp.vp_distance_at(self.context, self.cube, grid, None, point, c.c_uint64(1), c.c_uint64(4), None, None, None))
         self.fails("NULL_POINTER", "points", vp.vp_distance_at(self.context, self.cube, grid, None, None, c.c_uint64(1), c.c_uint64(0), None, None, None))
         self.fails("BAD_OPTION", "axis is 3", vp.vp_fractions(self.context, self.cube, grid, c.byref(FractionOptions(axis=3)), c.byref(out_float), None))
+        links, short = c.c_void_p(), LinkOptions()
+        short.struct_size = 4
+        for wrong in (6, 17, -1):
+            self.fails("BAD_OPTION", f"neighbours is {wrong}, not 18 or 26", vp.vp_links_create(self.context, self.cube, grid, c.byref(LinkOptions(neighbours=wrong)), c.byref(links), None))
+        self.fails("VERSION", "options", vp.vp_links_create(self.context, self.cube, grid, c.byref(short), c.byref(links), None))
+        for wrong in (-1, 26):
+            self.fails("BAD_OPTION", f"link is {wrong}", vp.vp_link_direction(wrong, (c.c_int32 * 3)()))
+        self.fails("NULL_POINTER", "direction", vp.vp_link_direction(0, None))
+        self.assertFalse(links)
         part = unit_grid(2, whole=(4, 4, 4))
         self.fails("BAD_OPTION", "crop", vp.vp_solid(self.context, self.cube, c.byref(part), c.byref(SolidOptions(repair=2)), c.byref(array(0, 8)), None))
         self.assertEqual(bytes(out.kept), bytes(64))
@@ -283,6 +296,33 @@ class Api(unittest.TestCase):
         listed = {tuple(coordinates[3 * i:3 * i + 3]) for i in range(56)}
         self.assertEqual(listed, {(i % 4, i // 4 % 4, i // 16) for i in range(64) if dense.kept[i]})
         vp.vp_list_destroy(voxels)
+
+    def test_links(self):
+        """A part of a grid has the links of the whole, and ranges are those of the whole list."""
+        links, part, n, neighbours = c.c_void_p(), c.c_void_p(), c.c_uint64(), c.c_uint32()
+        self.ok(vp.vp_links_create(self.context, self.cube, c.byref(unit_grid()), None, c.byref(links), None))
+        self.ok(vp.vp_links_size(links, c.byref(n), c.byref(neighbours)))
+        self.assertEqual((n.value, neighbours.value), (56, 18))  # all but the corners, beyond which only corners lie
+        places, q, triangles, parts = (c.c_int32 * 168)(), (c.c_float * 1008)(), (c.c_int64 * 1008)(), (c.c_int32 * 1008)()
+        for first, count in ((0, 57), (56, 1), (2**63, 2**63)):
+            self.fails("BAD_INDEX", "of 56 with links", vp.vp_links_read(links, c.c_uint64(first), c.c_uint64(count), places, q, triangles, parts))
+        self.assertEqual(sum(places), 0)
+        self.ok(vp.vp_links_read(links, c.c_uint64(0), n, places, q, triangles, parts))
+        rows = {tuple(places[3 * i:3 * i + 3]): (q[18 * i:18 * i + 18], triangles[18 * i:18 * i + 18]) for i in range(56)}
+        self.assertEqual(sorted(rows, key=lambda p: p[::-1]), list(rows))
+        self.assertEqual({t for of in rows.values() for t in of[1]}, set(range(-1, 12)))
+        self.assertEqual([t == -1 for t in triangles], [p == -1 for p in parts])
+        one = (c.c_float * 18)()
+        self.ok(vp.vp_links_read(links, c.c_uint64(20), c.c_uint64(1), None, one, None, None))
+        self.assertEqual(list(one), q[360:378])
+        half = Grid(voxel_size=(1, 1, 1), extent=(4, 4, 2), offset=(0, 0, 2), whole=(4, 4, 4))
+        self.ok(vp.vp_links_create(self.context, self.cube, c.byref(half), None, c.byref(part), None))
+        self.ok(vp.vp_links_size(part, c.byref(n), None))
+        self.ok(vp.vp_links_read(part, c.c_uint64(0), n, places, q, None, None))
+        found = {(places[3 * i], places[3 * i + 1], places[3 * i + 2] + 2): q[18 * i:18 * i + 18] for i in range(n.value)}
+        self.assertEqual(found, {p: of[0] for p, of in rows.items() if p[2] >= 2})
+        vp.vp_links_destroy(links)
+        vp.vp_links_destroy(part)
 
     def test_memory_that_runs_out(self):
         """Calls that need more than the process may have fail with a message, and work afterwards."""

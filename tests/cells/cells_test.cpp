@@ -235,6 +235,65 @@ TEST(Cells, OpenMeshesAreToldByRowsAndEdges) {
     EXPECT_EQ(library_cells(m, g).status.cells.volume(), 0.0);
 }
 
+// Vertices are the same where their places are: of triangles that share none, too.
+TEST(Cells, EdgesJoinPlacesAndNotVertices) {
+    const vp::grid g = solids::unit_grid(glm::ivec3(12));
+    const mesh ball = solids::sphere({6.1f, 5.9f, 6}, 4.3f, 2);
+    mesh apart;
+    for (auto t = ball.triangles.rbegin(); t != ball.triangles.rend(); ++t) {
+        const auto first = static_cast<std::uint32_t>(apart.positions.size());
+        for (const std::uint32_t v : {t->y, t->z, t->x}) apart.positions.push_back(ball.positions[v]);
+        apart.triangles.push_back({first, first + 1, first + 2});
+    }
+    const auto open_edges = [&](const mesh& m) { return library_cells(m, g).status.cells.open_edges; };
+    EXPECT_EQ(open_edges(ball), 0u);
+    EXPECT_EQ(open_edges(apart), 0u);
+    apart.triangles.push_back({0, 1, 1}); // there and back, and an edge without length
+    apart.triangles.push_back({2, 2, 2});
+    EXPECT_EQ(open_edges(apart), 0u);
+    apart.positions[30].y = std::numeric_limits<float>::quiet_NaN(); // a triangle that is dropped
+    EXPECT_EQ(open_edges(apart), 3u);
+    apart.triangles[4] = {12, 14, 13}; // turned
+    EXPECT_EQ(open_edges(apart), 3u + 6u);
+}
+
+// The fraction by a shader that makes no promise.
+struct fraction_of_place {
+    VOXELPIPE_HD vp::output<float> operator()(const vp::cell_fragment& f) const { return vp::outputs(f.fraction); }
+};
+
+// Voxels between two that are cut are drawn as one where the shader ignores the place; not into targets that load.
+TEST(Cells, RunsOfVoxelsHaveTheValuesOfVoxels) {
+    const std::vector<mesh> meshes{solids::box({1.5f, 1, 2.25f}, {17.5f, 12, 13}), solids::sphere({9, 7, 8}, 5.2f, 2),
+                                   solids::box({-3, 4, 4}, {30, 6.5f, 6}).inside_out()};
+    const vp::grid g = solids::unit_grid({21, 15, 17});
+    vp::cpu_backend backend(2);
+    using summed = vp::framebuffer<vp::cpu_backend, vp::target<float, vp::blend::add>>;
+    const auto draw = [&]<class Shader>(const Shader& shader, summed& fb, const vp::cell_options& options) {
+        std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, Shader>> draws;
+        for (const mesh& m : meshes) draws.push_back({m.view(), {}, shader});
+        return vp::voxelize_cells(backend, draws, g, fb, options);
+    };
+    for (int axis = 0; axis < 3; ++axis)
+        for (const vp::bodies each : {vp::bodies::call, vp::bodies::draw}) {
+            const vp::cell_options how{.bodies = each, .axis = axis};
+            summed a(backend, g.extent), b(backend, g.extent);
+            vp::get<0>(a).clear(0.125f);
+            vp::get<0>(b).clear(0.125f);
+            for (int call = 0; call < 2; ++call) { // the second one loads what the first one drew
+                const vp::status by_runs = draw(vp::fraction{}, a, how), by_voxels = draw(fraction_of_place{}, b, how);
+                ASSERT_TRUE(by_runs.ok() && by_voxels.ok());
+                EXPECT_EQ(by_runs.counts, by_voxels.counts);
+                EXPECT_EQ(by_runs.cells, by_voxels.cells);
+                const std::vector<float> found = vp::get<0>(a).to_host(backend);
+                EXPECT_EQ(found, vp::get<0>(b).to_host(backend));
+                EXPECT_GT(std::count(found.begin(), found.end(), call == 0 ? 1.125f : 2.125f), 500);
+                vp::get<0>(a).load();
+                vp::get<0>(b).load();
+            }
+        }
+}
+
 // A box without triangles whose normals look along an axis, to one side.
 mesh box_without_side(const glm::vec3& low, const glm::vec3& high, int axis, bool upper) {
     mesh m = solids::box(low, high);

@@ -10,6 +10,9 @@
 #include <random>
 #include <sys/mman.h>
 #include <ucontext.h>
+#if __has_include(<valgrind/valgrind.h>)
+#include <valgrind/valgrind.h>
+#endif
 #include <vector>
 
 uint3 threadIdx, blockIdx;
@@ -69,6 +72,7 @@ public:
                              MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_STACK, -1, 0);
         if (p == MAP_FAILED) fail("no room for stacks");
         stacks_ = static_cast<unsigned char*>(p);
+        tell_valgrind();
     }
     block(const block&) = delete;
     block& operator=(const block&) = delete;
@@ -135,6 +139,15 @@ public:
     }
 
 private:
+    // Else it takes a jump to another thread for the end of functions, and what their stack holds for lost.
+    void tell_valgrind() const {
+#if __has_include(<valgrind/valgrind.h>)
+        if (RUNNING_ON_VALGRIND == 0) return;
+        for (std::size_t i = 0; i < max_threads; ++i)
+            (void)VALGRIND_STACK_REGISTER(stacks_ + stack_bytes * i, stacks_ + stack_bytes * (i + 1));
+#endif
+    }
+
     static unsigned seed() {
         const char* const text = std::getenv("VOXELPIPE_EMULATION_SEED");
         return text == nullptr ? 1u : static_cast<unsigned>(std::strtoul(text, nullptr, 10));

@@ -44,6 +44,8 @@ TEST(GiOnAGpu, ViewsAreTheCpus) {
     gi::settings samples = picture(33, 17, 32);
     samples.samples = 3;
     expect_same_pictures(gi::make_atrium, samples);
+    samples.thorough = true;
+    expect_same_pictures(gi::make_cornell, samples);
 }
 
 } // namespace

@@ -32,6 +32,9 @@ TEST(GiProgram, WritesOnePicture) {
         EXPECT_NE(made.out.find(std::string("  ") + stage), std::string::npos) << stage;
     const outcome again = run_gi(folder, quick(folder / "y.png", {"--frames", "1"}));
     EXPECT_EQ(read_file(folder / "x.png"), read_file(folder / "y.png")) << again.err;
+    const outcome thorough = run_gi(folder, quick(folder / "z.png", {"--frames", "1", "--thorough"}));
+    ASSERT_EQ(thorough.code, 0) << thorough.err;
+    EXPECT_NE(read_file(folder / "x.png"), read_file(folder / "z.png"));
 }
 
 TEST(GiProgram, HasEveryView) {

@@ -220,53 +220,104 @@ TEST(RankSolids, SaysWhatIsWrong) {
               status_code::bad_solid_options);
 }
 
-// Fractions of each rank's slab are those of one call, with the counts of the whole on every rank; with holes closed.
-TEST(RankCells, SlabsAreTheWhole) {
-    const glm::ivec3 size(15, 14, 23);
-    const vp::grid g = unit::unit_grid(size);
-    unit::small_mesh m;
-    unit::add_box(m, {2.25f, 1.5f, 1.75f}, {13.5f, 12.25f, 20.5f});
-    unit::add_box(m, {9.5f, 9.25f, 8.5f}, {12.5f, 18.0f, 21.75f});
-    m.triangles.erase(m.triangles.begin() + 3);
+// Two bodies, one of which is open.
+struct floats_of_ranks {
     using field = vp::framebuffer<backend_type, vp::target<float, vp::blend::replace>>;
-    for (const vp::repair repair : {vp::repair::none, vp::repair::close_holes}) {
-        vp::cell_options how;
-        how.count_open_edges = false;
-        how.repair = repair;
-        backend_type backend = unit::make_backend(1);
+    glm::ivec3 size{15, 14, 23};
+    vp::grid g = unit::unit_grid(size);
+    unit::small_mesh m;
+    backend_type backend = unit::make_backend(1);
+    slabs::stream_options options;
+
+    floats_of_ranks() {
+        unit::add_box(m, {2.25f, 1.5f, 1.75f}, {13.5f, 12.25f, 20.5f});
+        unit::add_box(m, {9.5f, 9.25f, 8.5f}, {12.5f, 18.0f, 21.75f});
+        m.triangles.erase(m.triangles.begin() + 3);
+        options.folder = ::testing::TempDir();
+    }
+    [[nodiscard]] auto make() {
+        return [this](glm::ivec3 extent) { return field{backend, extent}; };
+    }
+
+    // draw_one(view, framebuffer) is one call; draw(stream, make, sink) is the ranks'. Each rank's slab is a part of
+    // the whole, and the status is that of one call on every rank.
+    template <class DrawOne, class Draw>
+    vp::status expect_whole(const DrawOne& draw_one, const Draw& draw) {
         const vp::mesh_view<> view{m.positions, m.triangles};
         field whole{backend, size};
-        const vp::status expected = vp::voxelize_cells(backend, view, g, vp::passthrough{}, vp::fraction{}, whole, how);
-        ASSERT_TRUE(expected.ok()) << expected.message();
-        slabs::stream_options options;
-        options.is_solid = true;
-        options.repair = repair;
-        options.folder = ::testing::TempDir();
+        const vp::status expected = draw_one(view, whole);
+        EXPECT_TRUE(expected.ok()) << expected.message();
         solid_stream stream(MPI_COMM_WORLD, backend, g, {}, options);
         const auto [first, last] = slabs::share_of(m.triangles.size(), my_rank(), num_ranks());
         vp::mesh_view<> mine = view;
         mine.triangles = vp::array_view<const glm::uvec3>(m.triangles.data() + first, last - first);
-        ASSERT_TRUE(stream.add(mine).ok());
+        EXPECT_TRUE(stream.add(mine).ok());
         const auto all = vp::get<0>(whole).to_host(backend);
+        const std::size_t layer = static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y);
         std::size_t layers = 0;
-        const auto make = [&](glm::ivec3 extent_of_slab) { return field{backend, extent_of_slab}; };
-        const auto compare = [&](const slabs::slab& part, const field& out) {
+        const vp::status s = draw(stream, make(), [&](const slabs::slab& part, const field& out) {
             const auto values = vp::get<0>(out).to_host(backend);
-            const std::size_t layer = 15 * 14;
             layers += values.size() / layer;
             EXPECT_TRUE(std::equal(values.begin(), values.end(),
                                    all.begin() + static_cast<std::ptrdiff_t>(layer) * part.where.offset.z));
-        };
-        const vp::status s = stream.draw_cells(vp::fraction{}, make, compare, how);
-        ASSERT_TRUE(s.ok()) << s.message();
+        });
+        EXPECT_TRUE(s.ok()) << s.message();
         EXPECT_EQ(s.counts, expected.counts);
         EXPECT_EQ(s.cells, expected.cells);
-        EXPECT_EQ(s.cells.cones != 0, repair == vp::repair::close_holes);
+        EXPECT_EQ(s.distance, expected.distance);
+        EXPECT_EQ(s.solid, expected.solid);
         EXPECT_EQ(layers, static_cast<std::size_t>(stream.slabs().slabs[static_cast<std::size_t>(my_rank())].size()));
-        how.axis = 1;
-        solid_stream refused(MPI_COMM_WORLD, backend, g, {}, options);
-        EXPECT_EQ(refused.draw_cells(vp::fraction{}, make, compare, how).code, vp::status_code::bad_cell_options);
+        return s;
     }
+    // The code of a call that is refused.
+    template <class Draw>
+    vp::status_code refusal(const Draw& draw) {
+        solid_stream stream(MPI_COMM_WORLD, backend, g, {}, options);
+        return draw(stream, make(), [](const slabs::slab&, const field&) { FAIL(); }).code;
+    }
+};
+
+// Fractions, with holes closed.
+TEST(RankCells, SlabsAreTheWhole) {
+    for (const vp::repair repair : {vp::repair::none, vp::repair::close_holes}) {
+        floats_of_ranks on;
+        vp::cell_options how{.count_open_edges = false, .repair = repair};
+        on.options.is_solid = true;
+        on.options.repair = repair;
+        const auto draw = [&](auto& stream, const auto& make, const auto& sink) {
+            return stream.draw_cells(vp::fraction{}, make, sink, how);
+        };
+        const vp::status s = on.expect_whole(
+            [&](const vp::mesh_view<>& view, auto& fb) {
+                return vp::voxelize_cells(on.backend, view, on.g, vp::passthrough{}, vp::fraction{}, fb, how);
+            },
+            draw);
+        EXPECT_EQ(s.cells.cones != 0, repair == vp::repair::close_holes);
+        how.axis = 1;
+        EXPECT_EQ(on.refusal(draw), vp::status_code::bad_cell_options);
+    }
+}
+
+// Distances: bands and whole fields, with holes closed and by winding numbers.
+TEST(RankDistances, SlabsAreTheWhole) {
+    for (const vp::repair repair : {vp::repair::none, vp::repair::close_holes, vp::repair::winding})
+        for (const vp::band& band : {vp::band(1.5), vp::band(vp::band::whole)}) {
+            floats_of_ranks on;
+            vp::distance_options how{.band = band, .repair = repair};
+            on.options.band = band;
+            on.options.repair = repair;
+            const auto draw = [&](auto& stream, const auto& make, const auto& sink) {
+                return stream.draw_distance(vp::distance{}, make, sink, how);
+            };
+            const vp::status s = on.expect_whole(
+                [&](const vp::mesh_view<>& view, auto& fb) {
+                    return vp::voxelize_distance(on.backend, view, on.g, vp::passthrough{}, vp::distance{}, fb, how);
+                },
+                draw);
+            EXPECT_EQ(s.solid.cones != 0, repair != vp::repair::none);
+            how.sample = vp::sample::corner;
+            EXPECT_EQ(on.refusal(draw), vp::status_code::bad_distance_options);
+        }
 }
 
 TEST_P(Ranks, AFailureOfOneRankEndsTheCallOnAll) {

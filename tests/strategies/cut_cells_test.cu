@@ -6,6 +6,8 @@
 #include "device_test.hpp"
 #include "solid_drawings.hpp"
 
+#include "../programs/module_cases.hpp"
+
 #include <voxelpipe/cells/device/cells.cuh>
 #include <voxelpipe/cells/device/sparse_cells.cuh>
 #include <voxelpipe/slabs/devices.cuh>
@@ -228,6 +230,12 @@ TEST(DeviceCells, SlabsOfSeveralGpusAreTheWhole) {
         other.axis = 1;
         EXPECT_EQ(parts.draw_cells(vp::fraction{}, dense, other).code, vp::status_code::bad_cell_options);
     }
+}
+
+// What programs make has the cells of a mesh.
+TEST(DeviceCells, ProgramsAreTheMadeMesh) {
+    vp::cuda_backend gpu;
+    programs::expect_cells_of_programs(gpu);
 }
 
 // Bricks, tiles and values of both backends, of both ways to make them, and the values of a dense call.

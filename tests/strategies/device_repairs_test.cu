@@ -106,6 +106,15 @@ TEST(DeviceRepairs, HolesAndVotes) {
         }
 }
 
+// Small enough for valgrind, which then says whether a result depends on memory that nobody has written.
+TEST(DeviceRepairs, FourSlabs) {
+    const mesh_data there = moved(broken_meshes()[0], places[1]);
+    const vp::grid g = box_grid({37, 26, 25});
+    case_of_slabs{there, g, {}, 4}.expect_same();
+    case_of_slabs{there, g, {.repair = vp::repair::vote}, 4}.expect_same();
+    case_of_slabs{there, g, {.repair = vp::repair::close_holes}, 4}.expect_same();
+}
+
 TEST(DeviceRepairs, WindingNumbers) {
     const mesh_data there = moved(broken_meshes()[1], places[2]);
     const vp::grid part = box_grid({67, 31, 29}).crop({3, 5, 2}, {33, 17, 20});

@@ -5,6 +5,9 @@
 
 #include "distance_drawings.hpp"
 
+#include "../programs/module_cases.hpp"
+
+#include <voxelpipe/slabs/devices.cuh>
 #include <voxelpipe/slabs/stream.hpp>
 
 #include <gtest/gtest.h>
@@ -143,6 +146,78 @@ TEST(DeviceDistance, SlabsOfAStreamAreTheWhole) {
         device_test::expect_same_bytes(vp::get<0>(whole).to_host(cpu), distances, "distances");
         device_test::expect_same_bytes(vp::get<1>(whole).to_host(cpu), nearest, "nearest");
     }
+}
+
+// Slabs of several GPUs, along z and where they may turn, dense and in bricks: the whole of the cpu.
+TEST(DeviceDistance, SlabsOfSeveralGpusAreTheWhole) {
+    namespace slabs = vp::slabs;
+    const vp::grid g = unit_grid({40, 40, 40}).crop({1, 2, 3}, {15, 17, 24});
+    mesh_data open = device_test::ball({8, 9, 14}, 5.3f, 7);
+    open.triangles.erase(open.triangles.end() - 7, open.triangles.end() - 3);
+    using one_distance = vp::target<float, vp::blend::replace>;
+    vp::cpu_backend cpu;
+    for (const vp::repair repair : {vp::repair::none, vp::repair::close_holes, vp::repair::winding})
+        for (const vp::band& band : {vp::band(1.5), vp::band(vp::band::whole)}) {
+            SCOPED_TRACE(static_cast<int>(repair));
+            const vp::distance_options how{.band = band, .repair = repair};
+            two_targets<vp::cpu_backend> whole(cpu, g.extent);
+            const vp::status expected = draw(cpu, {open}, g, nearest_shader{}, whole, how, false);
+            ASSERT_TRUE(expected.ok()) << expected.message();
+            slabs::devices gpus(std::vector<int>{0, 0, 0}, false);
+            slabs::device_options options;
+            options.may_turn = false;
+            options.voxel_bytes = 1000; // slabs of about equal thickness, also beside the mesh
+            options.repair = repair;
+            options.band = band;
+            const vp::mesh_view<> view{open.positions, open.triangles};
+            slabs::device_slabs parts(gpus, g, view, vp::passthrough{}, options);
+            auto dense = parts.make([](vp::cuda_backend& gpu, glm::ivec3 e) {
+                return two_targets<vp::cuda_backend>{gpu, e};
+            });
+            ASSERT_EQ(dense.size(), 3u);
+            const vp::status s = parts.draw_distance(nearest_shader{}, dense, how);
+            expect_same_status(expected, s);
+            std::vector<float> distances;
+            std::vector<std::int64_t> nearest;
+            for (std::size_t i = 0; i < dense.size(); ++i) { // layers along z follow each other
+                const auto d = vp::get<0>(dense[i]).to_host(gpus.backend(i));
+                const auto n = vp::get<1>(dense[i]).to_host(gpus.backend(i));
+                distances.insert(distances.end(), d.begin(), d.end());
+                nearest.insert(nearest.end(), n.begin(), n.end());
+            }
+            device_test::expect_same_bytes(vp::get<0>(whole).to_host(cpu), distances, "distances");
+            device_test::expect_same_bytes(vp::get<1>(whole).to_host(cpu), nearest, "nearest");
+            if (!band.is_whole) {
+                vp::sparse_framebuffer<vp::cpu_backend, one_distance> whole_bricks(cpu, g.extent);
+                ASSERT_TRUE(draw(cpu, {open}, g, vp::distance{}, whole_bricks, how, false).ok());
+                auto bricks = parts.make([](vp::cuda_backend& gpu, glm::ivec3 e) {
+                    return vp::sparse_framebuffer<vp::cuda_backend, one_distance>{gpu, e};
+                });
+                ASSERT_TRUE(parts.draw_distance(vp::distance{}, bricks, how).ok());
+                std::vector<vp::host_sparse<one_distance>> hosts;
+                for (std::size_t i = 0; i < bricks.size(); ++i) hosts.push_back(bricks[i].to_host(gpus.backend(i)));
+                EXPECT_TRUE(vp::same_contents(vp::merge(std::span<const vp::host_sparse<one_distance>>(hosts)),
+                                              whole_bricks.to_host(cpu)));
+            }
+            using vp::status_code;
+            vp::distance_options other = how;
+            other.band = vp::band(2.5);
+            EXPECT_EQ(parts.draw_distance(nearest_shader{}, dense, other).code, status_code::bad_distance_options);
+            other = how;
+            other.sample = vp::sample::corner;
+            EXPECT_EQ(parts.draw_distance(nearest_shader{}, dense, other).code, status_code::bad_distance_options);
+            auto bits = parts.make([](vp::cuda_backend& gpu, glm::ivec3 e) {
+                return vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, vp::blend::bit_or>>{gpu, e};
+            });
+            EXPECT_EQ(parts.draw(vp::constant(true), bits).code, status_code::bad_distance_options);
+        }
+}
+
+// What programs make has the distances of a mesh, on either backend, with the numbers of the input.
+TEST(DeviceDistance, ProgramsAreTheMadeMesh) {
+    vp::cuda_backend gpu;
+    programs::expect_distances_of_programs(gpu);
+    programs::expect_distances_without_what_is_left_out(gpu);
 }
 
 TEST(DeviceDistance, PointsHaveTheBytesOfTheCpu) {

@@ -5,6 +5,7 @@
 
 #include "../surfaces/slab_support.hpp"
 #include "../surfaces/sparse_support.hpp"
+#include "../surfaces/stream_support.hpp"
 #include "../surfaces/value_support.hpp"
 
 #include <cpu_ref/backend.hpp>
@@ -108,6 +109,36 @@ TEST(DeviceSurfaces, SlabsHaveTheBytesOfTheWhole) {
         EXPECT_EQ(joined.triangles, whole.triangles);
         EXPECT_EQ(joined.quads, whole.quads);
     }
+}
+
+TEST(DeviceSurfaces, RemeshedSlabsHaveTheBytesOfTheCpu) {
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    const host_mesh m = bad_model(2);
+    const vp::grid g = grid_around_models(glm::ivec3(18, 21, 19));
+    for (const vp::remesh_options& o :
+         {vp::remesh_options{.repair = vp::repair::close_holes}, vp::remesh_options{.level = 0.05}}) {
+        host_values whole = remesh_with_values(cpu, m, g, o);
+        whole.mesh = without_components(whole.mesh);
+        EXPECT_GT(whole.at.size(), 50u);
+        EXPECT_TRUE(join_remeshed(gpu, m, g, {1, 8, 2, 8}, o).has_same_arrays(whole));
+    }
+}
+
+TEST(DeviceSurfaces, StreamedOnesHaveTheBytesOfTheCpu) {
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    const host_mesh m = ball(glm::vec3(0.5f), 0.37f, 2);
+    const vp::grid g = grid_around_models(glm::ivec3(35, 12, 14));
+    const auto expect_stream = [&](const vp::extract_options& o, const auto& how) {
+        const host_surface whole = without_components(extract_drawn(cpu, m, g, o, how));
+        EXPECT_GT(whole.vertices.size(), 200u);
+        const streamed_surface found = stream_surface(gpu, m, g, o, how, {.num_slabs = 5});
+        EXPECT_TRUE(found.surface.has_same_arrays(whole)) << found.surface.status.message();
+        EXPECT_EQ(found.pieces, 4); // the two layers of the first slab wait
+    };
+    expect_stream({}, vp::solid_options{});
+    expect_stream({.level = 0.03}, vp::distance_options{});
 }
 
 TEST(DeviceSurfaces, ValuesHaveTheBytesOfTheCpu) {

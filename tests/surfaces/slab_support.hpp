@@ -5,10 +5,40 @@
 // Surfaces of slabs, joined, on any backend.
 
 #include "surface_support.hpp"
+#include "value_support.hpp"
 
 #include <voxelpipe/surfaces/extract_slab.hpp>
+#include <voxelpipe/surfaces/remesh_slab.hpp>
+
+#include <gtest/gtest.h>
+
+#include <span>
 
 namespace surface_tests {
+
+// Adds a slab's arrays, and what it counts.
+inline void append(host_surface& joined, const host_surface& one) {
+    const auto add = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+    add(joined.vertices, one.vertices);
+    add(joined.triangles, one.triangles);
+    add(joined.quads, one.quads);
+    add(joined.sources, one.sources);
+    if (!one.status.ok()) joined.status.code = one.status.code;
+    vp::surface_counters& sum = joined.status.surface;
+    const vp::surface_counters& part = one.status.surface;
+    sum.vertices += part.vertices;
+    sum.faces += part.faces;
+    sum.nan_samples += part.nan_samples;
+    sum.made_crossings += part.made_crossings;
+    sum.cone_crossings += part.cone_crossings;
+    sum.nearest_values += part.nearest_values;
+}
+
+// The whole as slabs give it, which count no components.
+[[nodiscard]] inline host_surface without_components(host_surface whole) {
+    whole.status.surface.components = 0;
+    return whole;
+}
 
 // The arrays of all slabs, one after the other. values: of the grid g, bits as 0 and 1. A slab has heights[i] layers.
 template <class T, class Backend>
@@ -38,11 +68,40 @@ template <class T, class Backend>
         vp::surface<Backend> s(backend);
         const vp::status status = vp::extract_slab(backend, view, g, slab, s, options);
         const host_surface one = to_host(backend, s, status);
-        joined.status.code = status.ok() ? joined.status.code : status.code;
-        joined.vertices.insert(joined.vertices.end(), one.vertices.begin(), one.vertices.end());
-        joined.triangles.insert(joined.triangles.end(), one.triangles.begin(), one.triangles.end());
-        joined.quads.insert(joined.quads.end(), one.quads.begin(), one.quads.end());
+        append(joined, one);
         slab.first_vertex += one.vertices.size();
+        slab.first += height;
+    }
+    return joined;
+}
+
+// A remesh slab by slab, with values of the vertices.
+template <class Backend>
+[[nodiscard]] host_values join_remeshed(Backend& backend, const host_mesh& mesh, const vp::grid& g,
+                                        const std::vector<int>& heights, const vp::remesh_options& options,
+                                        const value_shader& shader = {}) {
+    const vp::mesh<Backend> m{backend, mesh.positions, mesh.triangles};
+    using draw_type = vp::draw<vp::mesh_view<>, place_shader, value_shader>;
+    const draw_type d{m.view(), {}, shader};
+    host_values joined;
+    joined.mesh.samples = vp::core::sample_grid(g, options.sample);
+    vp::surface_slab slab;
+    for (const int height : heights) {
+        slab.layers = height;
+        vp::surface<Backend, glm::vec3, std::uint32_t, std::uint32_t, glm::vec3> s(backend);
+        const vp::status status = vp::remesh_slab(backend, std::span<const draw_type>(&d, 1), g, slab, s, options);
+        EXPECT_TRUE(status.ok()) << status.message();
+        EXPECT_EQ(s.samples, joined.mesh.samples);
+        append(joined.mesh, to_host(backend, s, status));
+        const auto add = [&](auto& to, const auto& from) {
+            const auto values = from.to_host(backend);
+            to.insert(to.end(), values.begin(), values.end());
+        };
+        add(joined.at, vp::get<0>(s));
+        add(joined.primitive, vp::get<1>(s));
+        add(joined.material, vp::get<2>(s));
+        add(joined.shares, vp::get<3>(s));
+        slab.first_vertex = joined.mesh.vertices.size();
         slab.first += height;
     }
     return joined;

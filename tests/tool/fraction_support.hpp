@@ -35,7 +35,8 @@ inline shape box(const glm::vec3& low, const glm::vec3& high, float shear = 0) {
     return made;
 }
 
-inline void add(builder& file, const shape& s) {
+// Returns the glTF primitive.
+inline json& add(builder& file, const shape& s) {
     std::vector<float> positions;
     for (const glm::vec3& p : s.positions) positions.insert(positions.end(), {p.x, p.y, p.z});
     std::vector<std::uint8_t> indices;
@@ -44,6 +45,7 @@ inline void add(builder& file, const shape& s) {
     const int index_accessor = file.accessor(indices, "SCALAR");
     json& primitive = file.mesh({{"POSITION", file.accessor(positions, "VEC3")}});
     primitive["indices"] = index_accessor;
+    return primitive;
 }
 
 inline vp::grid grid_of_16() {

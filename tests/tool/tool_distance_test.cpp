@@ -285,17 +285,94 @@ TEST(Distance, WhatDoesNotGoTogetherIsRefused) {
     refused({"--distance", "--backend", "cuda", "--devices", "2"}, "one GPU draws distances", 5);
 }
 
+// What shows voxels needs the field whole.
 TEST(Distance, AFieldBeyondMemoryIsRefusedWithBothNumbers) {
     const scratch_folder folder;
     builder file;
     add_box(file, low, high);
     file.write_glb(folder / "m.glb");
-    const outcome result = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "--distance", "--band", "whole", "-r",
-                                        "1000", "--max-memory", "300"});
-    EXPECT_EQ(3, result.code) << result.err;
-    EXPECT_NE(std::string::npos, result.err.find("a whole distance field of 875 x 875 x 1000 samples")) << result.err;
-    EXPECT_NE(std::string::npos, result.err.find("300 MiB")) << result.err;
-    EXPECT_FALSE(fs::exists(folder / "o.npy"));
+    for (const char* output : {"o.nvdb", "o.html"}) {
+        const outcome result = run(folder, {folder / "m.glb", "-o", folder / output, "--distance", "--band", "whole",
+                                            "-r", "1000", "--max-memory", "300"});
+        EXPECT_EQ(3, result.code) << result.err;
+        EXPECT_NE(std::string::npos, result.err.find("a whole distance field of 875 x 875 x 1000 samples"))
+            << result.err;
+        EXPECT_NE(std::string::npos, result.err.find("300 MiB")) << result.err;
+        EXPECT_FALSE(fs::exists(folder / output));
+    }
+    // Two slabs of 256 layers do not fit either.
+    const outcome slabs =
+        run(folder, {folder / "m.glb", "-o", folder / "o.zarr", "--distance", "-r", "4000", "--max-memory", "300"});
+    EXPECT_EQ(3, slabs.code) << slabs.err;
+    EXPECT_NE(std::string::npos, slabs.err.find("in slabs of 256 layers: ")) << slabs.err;
+    EXPECT_FALSE(fs::exists(folder / "o.zarr"));
+}
+
+// A large file at once.
+std::string bytes_of_file(const fs::path& file) {
+    std::string bytes(fs::file_size(file), '\0');
+    std::ifstream(file, std::ios::binary).read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    return bytes;
+}
+
+// The bytes of a run that holds the field, and its counts and warnings.
+TEST(Distance, AFieldBeyondMemoryIsDrawnInSlabs) {
+    if (sanitized) return; // which takes memory of its own
+    const scratch_folder folder;
+    builder file;
+    add_box(file, low, high, 2); // open
+    file.write_glb(folder / "m.glb");
+    struct way {
+        std::string output;
+        unsigned layers, bytes; // a sample
+        std::vector<std::string> more;
+    };
+    for (const way& w : {way{"npy", 700, 4, {}}, way{"npz", 400, 12, {"--band", "1", "-t", "nearest"}},
+                         way{"zarr", 1100, 4, {"--close-holes"}}}) {
+        const auto draw = [&](const std::string& name, const std::vector<std::string>& limit) {
+            std::vector<std::string> all{folder / "m.glb",
+                                         "-o",
+                                         folder / name + "." + w.output,
+                                         "--distance",
+                                         "--origin",
+                                         "-2,-2,-4",
+                                         "-s",
+                                         "0.03125",
+                                         "--extent",
+                                         "100,100," + std::to_string(w.layers),
+                                         "--stats=json"};
+            all.insert(all.end(), w.more.begin(), w.more.end());
+            all.insert(all.end(), limit.begin(), limit.end());
+            return run(folder, all);
+        };
+        const outcome whole = draw("whole", {});
+        ASSERT_EQ(0, whole.code) << whole.err;
+        const json a = json::parse(whole.out);
+        const unsigned field = 100 * 100 * w.layers * w.bytes, peak = a["peak_memory_bytes"],
+                       limit = (peak - field / 10 * 3) >> 20;
+        const outcome tight = draw("tight", {"--max-memory", std::to_string(limit)});
+        ASSERT_EQ(0, tight.code) << w.output << ": " << tight.err;
+        const json b = json::parse(tight.out);
+        EXPECT_LE(b["peak_memory_bytes"], limit << 20);
+        EXPECT_EQ(1, a["slabs"]);
+        EXPECT_GT(b["slabs"], 1) << w.output;
+        EXPECT_EQ(a["voxels"], b["voxels"]);
+        EXPECT_EQ(a["distance"], b["distance"]);
+        EXPECT_EQ(a["warnings"], b["warnings"]);
+        const fs::path first = folder / "whole." + w.output, second = folder / "tight." + w.output;
+        if (!fs::is_directory(first)) {
+            EXPECT_TRUE(bytes_of_file(first) == bytes_of_file(second)) << w.output;
+            continue;
+        }
+        int files = 0;
+        for (const fs::directory_entry& entry : fs::recursive_directory_iterator(first)) {
+            if (!entry.is_regular_file()) continue;
+            ++files;
+            EXPECT_TRUE(bytes_of_file(entry.path()) == bytes_of_file(second / fs::relative(entry.path(), first)))
+                << entry.path();
+        }
+        EXPECT_GT(files, 5);
+    }
 }
 
 } // namespace

@@ -1,12 +1,20 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// --target area, centroid, aperture_x, aperture_y and aperture_z: those of boxes, in every format of arrays.
+// --target area, centroid, aperture_x, aperture_y and aperture_z: those of boxes, in every format of arrays. --target
+// links: the library's lists.
 #include "fraction_support.hpp"
+
+#include <cpu_ref/backend.hpp>
+#include <voxelpipe/cells/links.hpp>
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <map>
 
 using namespace tool_test;
 using namespace fraction_test;
@@ -137,6 +145,165 @@ TEST(Measures, InEveryFormatOfArrays) {
         }
     const std::string zarr = read_file(folder / "o-aperture_x.zarr/aperture_x/zarr.json");
     EXPECT_NE(std::string::npos, zarr.find("17")) << zarr;
+}
+
+// A voxel of a list of links, by its place: q, triangles and materials.
+struct link_row {
+    std::vector<float> q;
+    std::vector<std::int32_t> triangles, materials;
+    bool operator==(const link_row&) const = default;
+};
+using place = std::array<int, 3>; // z, y, x
+using link_rows = std::map<place, link_row>;
+
+// The library's links of parts; part i has the material i.
+link_rows library_links(const std::vector<shape>& parts, const vp::grid& grid, int neighbours) {
+    vp::cpu_backend backend(1);
+    std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, vp::none>> draws;
+    for (const shape& part : parts)
+        draws.push_back(
+            {{{part.positions.data(), part.positions.size()}, {part.triangles.data(), part.triangles.size()}}, {}, {}});
+    vp::link_list<vp::cpu_backend> found(backend);
+    const vp::status status = vp::voxelize_links(backend, draws, grid, found, vp::link_options{neighbours});
+    EXPECT_TRUE(status.ok()) << status.message();
+    link_rows rows;
+    const std::vector<glm::ivec3> voxels = found.voxels.to_host(backend);
+    const std::vector<float> q = found.q.to_host(backend);
+    const auto triangles = found.primitives.to_host(backend), of_draws = found.draws.to_host(backend);
+    for (std::size_t i = 0; i < voxels.size(); ++i) {
+        link_row& row = rows[{voxels[i].z, voxels[i].y, voxels[i].x}];
+        for (std::size_t at = i * static_cast<std::size_t>(neighbours);
+             row.q.size() < static_cast<std::size_t>(neighbours); ++at) {
+            row.q.push_back(q[at]);
+            row.triangles.push_back(static_cast<std::int32_t>(triangles[at]));
+            row.materials.push_back(static_cast<std::int32_t>(of_draws[at]));
+        }
+    }
+    return rows;
+}
+
+// What files NAME.npy, NAME.links.npy and so on hold, each voxel moved by SHIFT.
+link_rows read_links(const std::filesystem::path& file, std::size_t neighbours, int shift = 0) {
+    const auto beside = [&](const char* word) {
+        return read_npy(std::filesystem::path(file).replace_extension(std::string(word) + ".npy"));
+    };
+    const array coords = read_npy(file), q = beside("links"), triangles = beside("link_triangle"),
+                materials = beside("link_material");
+    EXPECT_EQ("<i4", coords.type);
+    EXPECT_EQ("<f4", q.type);
+    EXPECT_EQ("<i4", triangles.type);
+    EXPECT_EQ((std::vector<std::size_t>{coords.shape[0], 3}), coords.shape);
+    for (const array* a : {&q, &triangles, &materials})
+        EXPECT_EQ((std::vector<std::size_t>{coords.shape[0], neighbours}), a->shape);
+    link_rows rows;
+    for (std::size_t n = 0; n < coords.shape[0]; ++n) {
+        const auto at = [&](std::size_t axis) { return coords.at<std::int32_t>(3 * n + axis) + shift; };
+        link_row& row = rows[{at(2), at(1), at(0)}];
+        for (std::size_t k = n * neighbours; k < (n + 1) * neighbours; ++k) {
+            row.q.push_back(q.at<float>(k));
+            row.triangles.push_back(triangles.at<std::int32_t>(k));
+            row.materials.push_back(materials.at<std::int32_t>(k));
+        }
+    }
+    EXPECT_EQ(coords.shape[0], rows.size());
+    return rows;
+}
+
+TEST(Links, AreThoseOfTheLibrary) {
+    const scratch_folder folder;
+    builder file;
+    shape sheet = box({-3.5F, -3.5F, 2.6F}, {3.5F, 3.5F, 3.25F});
+    sheet.triangles.resize(2); // an open one
+    const std::vector<shape> parts{tilted, sheet};
+    for (const shape& part : parts) {
+        json& primitive = add(file, part);
+        primitive["material"] = gltf_test::add_material(file, {1, 1, 1, 1});
+    }
+    for (const std::size_t neighbours : {std::size_t{18}, std::size_t{26}}) {
+        const link_rows expected = library_links(parts, grid_of_16(), static_cast<int>(neighbours));
+        EXPECT_GT(expected.size(), 500U);
+        for (const char* const threads : {"1", "3"}) {
+            const outcome result = draw(folder, file, "o.npy",
+                                        {"-t", "links,link_triangle,link_material", "--neighbours",
+                                         std::to_string(neighbours), "-j", threads, "--stats", "json"});
+            ASSERT_EQ(0, result.code) << result.err;
+            EXPECT_EQ(std::string::npos, result.err.find("warning")) << result.err;
+            EXPECT_TRUE(read_links(folder / "o.npy", neighbours) == expected);
+            std::size_t crossed = 0;
+            for (const auto& [at, row] : expected)
+                crossed +=
+                    static_cast<std::size_t>(std::count_if(row.q.begin(), row.q.end(), [](float q) { return q > 0; }));
+            const json stats = json::parse(result.out);
+            EXPECT_EQ(expected.size(), stats["voxels"].get<std::size_t>());
+            EXPECT_EQ(crossed, stats["fragments"].get<std::size_t>());
+            EXPECT_FALSE(stats.contains("fractions"));
+        }
+    }
+    // 18 without the option, and one file of all.
+    ASSERT_EQ(0, draw(folder, file, "a.npy", {"-t", "links"}).code);
+    ASSERT_EQ(0, draw(folder, file, "b.npy", {"-t", "links", "--neighbours", "18", "--sparse"}).code);
+    EXPECT_EQ(read_file(folder / "a.npy"), read_file(folder / "b.npy"));
+    EXPECT_EQ(read_file(folder / "a.links.npy"), read_file(folder / "b.links.npy"));
+    ASSERT_EQ(0, draw(folder, file, "c.npz", {"-t", "links", "--compression", "0"}).code);
+    const std::string archive = read_file(folder / "c.npz");
+    for (const char* const member : {"a.npy", "a.links.npy"})
+        EXPECT_NE(std::string::npos, archive.find(read_file(folder / member)));
+}
+
+// A ring around the grid is fluid, whose links lead into the walls.
+TEST(Links, AreThoseOfThePaddingToo) {
+    const scratch_folder folder;
+    builder file;
+    add(file, box({-2.1F, -1.9F, -2.2F}, {2.3F, 1.8F, 2.1F}));
+    const std::string wanted = "links,link_triangle,link_material";
+    file.write_glb(folder / "m.glb");
+    const auto drawn = [&](const std::string& output, std::vector<std::string> grid) {
+        grid.insert(grid.begin(), {folder / "m.glb", "-o", folder / output, "-t", wanted, "-s", "0.5"});
+        const outcome result = run(folder, grid);
+        EXPECT_EQ(0, result.code) << result.err;
+    };
+    drawn("plain.npy", {});
+    drawn("padded.npy", {"--padding", "2"});
+    const link_rows plain = read_links(folder / "plain.npy", 18), padded = read_links(folder / "padded.npy", 18, -2);
+    EXPECT_GT(padded.size(), plain.size() + 100);
+    for (const auto& [at, row] : plain) {
+        ASSERT_TRUE(padded.contains(at));
+        EXPECT_TRUE(padded.at(at) == row);
+    }
+}
+
+TEST(Links, WhatDoesNotGoWithThemIsRefused) {
+    const scratch_folder folder;
+    builder file;
+    add(file, tilted);
+    const auto refused = [&](std::vector<std::string> arguments, const std::string& why, int code = 1,
+                             const std::string& output = "o.npz") {
+        const outcome result = draw(folder, file, output, arguments);
+        EXPECT_EQ(code, result.code) << why << ": " << result.err;
+        EXPECT_NE(std::string::npos, result.err.find(why)) << result.err;
+        EXPECT_FALSE(std::filesystem::exists(folder / output));
+    };
+    refused({"-t", "links", "--neighbours", "6"}, "--neighbours is 18 or 26, not 6");
+    refused({"-t", "fraction", "--neighbours", "18"}, "--neighbours goes with --target links");
+    refused({"--neighbours", "18"}, "--neighbours goes with --target links");
+    refused({"-t", "link_triangle"}, "--target link_triangle goes with --target links");
+    refused({"-t", "links,fraction"}, "go with it, fraction does not");
+    refused({"-t", "links,color"}, "go with it, color does not");
+    refused({"-t", "links", "--solid", "nonzero"}, "--solid and --target links do not go together");
+    refused({"-t", "links", "--close-holes"}, "--close-holes and --target links");
+    refused({"-t", "links", "--dense"}, "--dense and --target links");
+    refused({"-t", "links", "--coverage", "thin"}, "--coverage and --target links");
+    refused({"-t", "links", "--alpha", "cutoff"}, "--alpha cutoff and --target links");
+    refused({"-t", "links", "--clamp"}, "--clamp goes with --target fraction");
+    refused({"-t", "links", "--resume"}, "--target links is one piece of work");
+    refused({"-t", "links", "--distance"}, "links does not go with --distance");
+    for (const std::string output : {"o.vti", "o.zarr", "o.nvdb", "o.nrrd"})
+        refused({"-t", "links"}, ".npz and .npy take the lists of --target links", 1, output);
+    refused({"-t", "links", "--backend", "cuda"}, "--target links is drawn on the CPU alone", 5);
+    const outcome far = run(folder, {folder / "m.glb", "-o", folder / "o.npz", "-t", "links", "--origin", "50,50,50",
+                                     "-s", "0.5", "--extent", "4,4,4"});
+    EXPECT_EQ(0, far.code) << far.err;
+    EXPECT_NE(std::string::npos, far.err.find("warning")) << far.err; // no voxel has any
 }
 
 } // namespace

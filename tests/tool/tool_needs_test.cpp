@@ -125,7 +125,7 @@ std::vector<std::string> targets_of(const voxelize::format& f) {
     return f.all_channels ? all_targets : std::vector<std::string>{"color"};
 }
 
-// A grid has some MiB to some tens of them. Fractions are dense.
+// A grid has some MiB to some tens of them. Fractions are dense, but for those that are named.
 std::vector<needs> all_needs() {
     std::vector<needs> all;
     for (const voxelize::format& f : voxelize::formats())
@@ -141,6 +141,10 @@ std::vector<needs> all_needs() {
     all.push_back({".npy", "area_vector", "--dense", dense_resolution});
     all.push_back({".npy", "area,centroid", "--dense", dense_resolution});
     all.push_back({".npy", "aperture_y", "--dense", dense_resolution});
+    all.push_back({".nvdb", "fraction", "--sparse", sparse_resolution});
+    all.push_back({".npz", "fraction,centroid", "--sparse", 160});
+    all.push_back({".vti", "area", "--sparse", sparse_resolution});
+    all.push_back({".npy", "links,link_triangle", "--sparse", sparse_resolution});
 #endif
     return all;
 }
@@ -320,6 +324,18 @@ TEST(MemoryNeedsOfBricks, AreKnownBeforeTheyAreDrawn) {
     if (sanitized) return;
     expect_early_end({"cube.glb", "-r", "20000"}, 300, 0, 5000);
     expect_early_end({"ball.glb", "-r", "6000"}, 100, 0, 400);
+}
+
+TEST(MemoryNeedsOfCells, AreWhatIsSaid) {
+    if (sanitized) GTEST_SKIP() << "shadow memory is no part of the figures";
+    expect_need({".nvdb", "fraction,area,centroid", "--sparse", 240});
+    expect_need({".npz", "links", "--sparse", 160});
+}
+
+TEST(MemoryNeedsOfCells, AreKnownBeforeTheyAreDrawn) {
+    if (sanitized) return;
+    expect_early_end({"ball.glb", "-r", "6000", "-t", "fraction", "--sparse"}, 100, 0, 300000);
+    expect_early_end({"ball.glb", "-r", "6000", "-t", "links"}, 100, 0, 80000);
 }
 
 // Against what the machine has, which is bounded here: it may have any amount.

@@ -61,6 +61,7 @@ std::set<std::string> all_options() {
             "--depth-axis AXIS",
             "--alpha RULE",
             "--clamp",
+            "--neighbours 18|26",
             "--backend NAME",
             "--strategy NAME",
             "--devices N|all",

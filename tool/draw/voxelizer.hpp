@@ -54,6 +54,7 @@ struct voxelize_request {
     std::vector<target> targets{target::occupancy}; // channels of the volume, in this order, none twice
     int depth_axis = 2;                             // 0 x, 1 y, 2 z
     bool clamp = false;                             // fractions to 0..1
+    int neighbours = 18;                            // links of a voxel: 18 or 26
     std::uint64_t close_holes = 0; // before cells are measured, holes of up to this number of edges; 0: no holes
     blend_alpha alpha = blend_alpha::weight;
     backend_choice backend = backend_choice::automatic;
@@ -76,6 +77,7 @@ struct voxelize_request {
     [[nodiscard]] bool wants(target id) const { return std::find(targets.begin(), targets.end(), id) != targets.end(); }
     [[nodiscard]] bool wants_colors() const { return std::any_of(targets.begin(), targets.end(), is_color); }
     [[nodiscard]] bool wants_cells() const { return std::any_of(targets.begin(), targets.end(), is_of_cells); }
+    [[nodiscard]] bool wants_links() const { return std::any_of(targets.begin(), targets.end(), is_of_links); }
 };
 
 // The name of the first target of cut cells, for messages.

@@ -18,6 +18,26 @@
 
 namespace voxelize {
 
+std::vector<std::uint32_t> set_voxels(sparse_volume& v, std::span<const glm::ivec3> voxels) {
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> sorted(voxels.size()); // key of the voxel, place
+    for (std::size_t i = 0; i < voxels.size(); ++i)
+        sorted[i] = {voxelpipe::core::morton_key(voxels[i]), static_cast<std::uint32_t>(i)};
+    std::sort(sorted.begin(), sorted.end());
+    std::vector<std::uint32_t> places;
+    places.reserve(voxels.size());
+    for (const auto& [key, place] : sorted) {
+        if (v.keys.empty() || v.keys.back() != key >> 9) {
+            v.keys.push_back(key >> 9);
+            v.masks.emplace_back();
+            v.offsets.push_back(places.size());
+        }
+        v.masks.back().words[(key & 511U) >> 6] |= std::uint64_t{1} << (key & 63U);
+        places.push_back(place);
+    }
+    if (!places.empty()) v.offsets.push_back(places.size());
+    return places;
+}
+
 std::uint32_t empty_value(const channel& c) {
     const std::optional<target> id = target_named(c.name);
     return id ? info_of(*id).empty : 0;

@@ -79,6 +79,10 @@ using slab_reader =
 // tiles.
 [[nodiscard]] sparse_volume open_tiles(const sparse_volume& v, const std::vector<std::uint64_t>* keys = nullptr);
 
+// The voxels become those of V, which has none. Returns the places in `voxels` of the voxels in their order in V. None
+// is listed twice.
+[[nodiscard]] std::vector<std::uint32_t> set_voxels(sparse_volume& v, std::span<const glm::ivec3> voxels);
+
 // The bricks of the occupied voxels of a dense volume, which has the channel "occupancy"; without channels.
 [[nodiscard]] sparse_volume find_bricks(const volume& v, int threads);
 

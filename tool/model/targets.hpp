@@ -32,6 +32,9 @@ enum class target : std::uint8_t {
     area_vector,
     area,
     centroid,
+    links, // those of links
+    link_triangle,
+    link_material,
     aperture_x,
     aperture_y,
     aperture_z
@@ -70,6 +73,12 @@ inline constexpr std::array all_targets{
     target_info{target::area, "area", scalar::f32, 1, "area of the surface in the voxel; see FRACTIONS"},
     target_info{target::centroid, "centroid", scalar::f32, 3,
                 "centroid of the part of the voxel that is inside, from its centre in voxels; see FRACTIONS"},
+    target_info{target::links, "links", scalar::f32, 18,
+                "part of the links to 18 neighbours before the surface; none: -1; see LINKS", 0xbf800000},
+    target_info{target::link_triangle, "link_triangle", scalar::i32, 18,
+                "beside links: number of the triangle that each crosses; none: -1", UINT32_MAX},
+    target_info{target::link_material, "link_material", scalar::i32, 18, "beside links: its material; none: -1",
+                UINT32_MAX},
     target_info{target::aperture_x, "aperture_x", scalar::f32, 1,
                 "how much of each face across x is inside, one more along x; see FRACTIONS"},
     target_info{target::aperture_y, "aperture_y", scalar::f32, 1, "the same of faces across y"},
@@ -77,14 +86,16 @@ inline constexpr std::array all_targets{
 };
 
 inline constexpr std::size_t target_count = all_targets.size();
-// Those of surfaces and solids, dense and sparse. Two others go with --distance; those of cut cells are measured of
-// whole triangles.
-inline constexpr std::span target_table = std::span(all_targets).first<target_count - 9>();
+// Those of surfaces and solids, dense and sparse. Two others go with --distance; those of cut cells and of links are
+// measured of whole triangles.
+inline constexpr std::span target_table = std::span(all_targets).first<target_count - 12>();
 
 [[nodiscard]] constexpr const target_info& info_of(target id) { return all_targets[static_cast<std::size_t>(id)]; }
 
-// What is measured of the whole of each triangle: the values of cut cells.
+// What is measured of the whole of each triangle: the values of cut cells, and those of links.
 [[nodiscard]] constexpr bool is_of_cells(target id) { return id >= target::fraction; }
+// What each link from a voxel to a neighbour has: a value for each of 18 neighbours, or of 26.
+[[nodiscard]] constexpr bool is_of_links(target id) { return id >= target::links && id <= target::link_material; }
 // What is measured of faces, of which a grid has one more along their axis than voxels: 0 to 2; -1 for other targets.
 [[nodiscard]] constexpr int axis_of_faces(target id) {
     return id < target::aperture_x ? -1 : static_cast<int>(id) - static_cast<int>(target::aperture_x);

@@ -14,6 +14,7 @@
 #include "run_outputs.hpp"
 #include "slab_run.hpp"
 #include "write/formats/blocks.hpp"
+#include "write/formats/zarr.hpp"
 #include "write/level_set.hpp"
 #include "write/sparse_formats.hpp"
 #include "write/surface_files.hpp"
@@ -102,6 +103,17 @@ std::vector<std::filesystem::path> write_output(Volume& voxels, const command_li
         voxels.channels.insert(voxels.channels.begin() + left_out.back().first, std::move(left_out.back().second));
     for (; !aside.empty(); aside.pop_back()) voxels.channels.push_back(std::move(aside.back()));
     return files;
+}
+
+// Layers of whose multiple the outputs take a field of distances in slabs; 0: one of them needs it whole.
+int slab_layers_of(const command_line& options) {
+    int layers = 1;
+    for (const std::filesystem::path& output : options.outputs) {
+        const std::string extension = lower_extension(zarr_target(output));
+        if (!is_streamed(extension) || shows_level(output)) return 0;
+        if (extension == ".zarr") layers = static_cast<int>(zarr_slab_layers); // shards are written one by one
+    }
+    return layers;
 }
 
 // The folder of a file.
@@ -298,6 +310,7 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
                                       options.write));
         return bytes;
     };
+    if (report.request.distance) report.request.distance->slab_layers = slab_layers_of(options);
     if (report.request.distance || report.request.remesh) {
         storage = {false, false, ""};
     } else if (!stream) {
@@ -334,13 +347,17 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
         voxels = run_voxelizer(std::move(model), report.request, report.stats);
     helps_to_stream = false;
     const std::uint64_t num_bricks = bricks.keys.size(), brick_bytes = bricks.num_bytes();
-    for (const std::string& warning : report.stats.warnings) report.warnings.push_back(warning);
-    warn_of_dropped(report);
-    warn_of_part(bounds, report);
-    if (report.stats.voxels == 0 && !report.request.distance)
-        report.warnings.push_back(why_empty(report.stats, report.request, bounds.low, bounds.high));
-    else if (report.stats.voxels == 0 && report.stats.triangles > report.stats.triangles_dropped)
-        report.warnings.push_back("no sample of the grid lies within the band of --distance around the model");
+    const bool is_late = is_drawn_late(voxels);
+    const auto tell = [&] {
+        for (const std::string& warning : report.stats.warnings) report.warnings.push_back(warning);
+        warn_of_dropped(report);
+        warn_of_part(bounds, report);
+        if (report.stats.voxels == 0 && !report.request.distance)
+            report.warnings.push_back(why_empty(report.stats, report.request, bounds.low, bounds.high));
+        else if (report.stats.voxels == 0 && report.stats.triangles > report.stats.triangles_dropped)
+            report.warnings.push_back("no sample of the grid lies within the band of --distance around the model");
+    };
+    if (!is_late) tell();
 
     start = clock::now();
     const std::shared_ptr<const block_list> blocks =
@@ -358,6 +375,10 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
             report.files.push_back(std::move(file));
     }
     bar.clear();
+    if (is_late) {
+        add_distance_warnings(report.request, report.stats);
+        tell();
+    }
     report.stats.milliseconds.emplace_back("write", milliseconds_since(start));
     start = clock::now();
     model = {};

@@ -310,13 +310,12 @@ std::vector<std::filesystem::path> write_sparse_png(const sparse_volume& v, cons
 // ---- the others
 // -------------------------------------------------------------------------------------------------------
 
-// Formats whose writers take the channels piece by piece, so that no dense one is ever there.
+} // namespace
+
 bool is_streamed(const std::string& extension) {
     return extension == ".npy" || extension == ".npz" || extension == ".vti" || extension == ".pvti" ||
            extension == ".nrrd" || extension == ".zarr" || extension == "{z}.png";
 }
-
-} // namespace
 
 bool is_sparse_format(const std::filesystem::path& path) {
     const format* const f = find_format(path);

@@ -33,4 +33,7 @@ std::vector<std::filesystem::path> write_vdb(const volume& v, const std::filesys
 std::vector<std::filesystem::path> write_nvdb(const volume& v, const std::filesystem::path& path,
                                               const write_options& options);
 
+// True for formats whose writers take the channels piece by piece, so that no dense one is ever there.
+[[nodiscard]] bool is_streamed(const std::string& extension);
+
 } // namespace voxelize

@@ -89,7 +89,7 @@ struct measured_cell : cell_fragment, core::value_of_cell<Values>... {};
 
 // Cell shader that returns the fraction: into one target of float.
 struct fraction {
-    static constexpr bool ignores_voxel = true; // sparse_cells.hpp makes tiles
+    static constexpr bool ignores_voxel = true; // called once for voxels of a row between two that are cut
     // The fragment's fraction.
     VOXELPIPE_HD output<float> operator()(const cell_fragment& f) const { return outputs(f.fraction); }
 };
@@ -117,6 +117,13 @@ inline constexpr unsigned
     needs_of_cells = (std::is_base_of_v<value_of_cell<cell_value::centroid>, Fragment> ? needs_centroid : 0) |
                      (std::is_base_of_v<value_of_cell<cell_value::area>, Fragment> ? needs_area : 0) |
                      (std::is_base_of_v<value_of_cell<cell_value::sheets>, Fragment> ? needs_sheets : 0);
+
+// True of a cell's shader that says so by a member `static constexpr bool ignores_voxel = true`, and of a constant:
+// what it returns does not depend on cell_fragment::voxel.
+template <class CellShader>
+inline constexpr bool ignores_voxel = is_constant<CellShader> || requires {
+    requires CellShader::ignores_voxel;
+};
 
 template <class CellShader>
 using cell_output = std::remove_cvref_t<std::invoke_result_t<const CellShader&, const cell_fragment_of<CellShader>&>>;

@@ -19,13 +19,6 @@ namespace core {
 // Names the call of a backend: draws, grid, sparse framebuffer, options, number of triangles.
 struct sparse_cells_tag {};
 
-// True of a cell's shader that says so by a member `static constexpr bool ignores_voxel = true`, and of a constant:
-// what it returns does not depend on cell_fragment::voxel.
-template <class CellShader>
-inline constexpr bool ignores_voxel = is_constant<CellShader> || requires {
-    requires CellShader::ignores_voxel;
-};
-
 // True of values that are equal iff their bits are.
 template <class T>
 inline constexpr bool is_its_bits = is_scalar<T> || vector_traits<T>::components != 1 || is_packed<T>;

@@ -45,7 +45,7 @@ run_in_chunks(Backend& backend, std::span<const draw<Mesh, VertexShader, Fragmen
         const std::optional<status> s = run_module(patches_tag<Known...>{}, backend, draws, g, out, plain, chunk);
         if (s) return s->ok() ? *s : name_bad_input(backend, draws, *s);
     }
-    const call_type call(backend, draws, g, chunk);
+    const call_type call(backend, draws, position_outside(g), chunk);
     if (!call.state().ok()) return name_bad_input(backend, draws, call.state());
     if (call.fits())
         return call.draw_at_once(
@@ -98,6 +98,20 @@ template <coverage... Known, class Backend, class Mesh, class VertexShader, clas
             if (is_last || has_written) throw;
         }
     }
+}
+
+// run(draws) with the triangles that the programs make, all of them at once, one mesh a draw. IsPlain, outside: as
+// program_call's.
+template <bool IsPlain, class Backend, class Mesh, class VertexShader, class Shader, class Amplify, class Run>
+[[nodiscard]] status run_at_once(Backend& backend, std::span<const draw<Mesh, VertexShader, Shader, Amplify>> draws,
+                                 const glm::vec3& outside, const Run& run) {
+    using call_type = program_call<Backend, Mesh, VertexShader, Shader, Amplify, IsPlain>;
+    return backend.guard([&] {
+        const call_type call(backend, draws, outside, ~std::uint64_t{0});
+        if (!call.state().ok()) return name_bad_input(backend, draws, call.state());
+        if (!call.fits()) return failure(status_code::out_of_memory, stage::vertex_shade);
+        return call.draw_at_once(run);
+    });
 }
 
 template <class T>
@@ -180,14 +194,8 @@ requires core::is_amplifier<Amplify>
             if (const status s = validate(g); !s.ok()) return s;
             if (const status s = core::validate(options, g); !s.ok()) return s;
             if (const status s = core::validate_program_draws(draws); !s.ok()) return s;
-            return backend.guard([&] {
-                using call_type = core::program_call<Backend, Mesh, VertexShader, SolidShader, Amplify, true>;
-                const call_type call(backend, draws, g, ~std::uint64_t{0});
-                if (!call.state().ok()) return core::name_bad_input(backend, draws, call.state());
-                if (!call.fits()) return core::failure(status_code::out_of_memory, stage::vertex_shade);
-                return call.draw_at_once([&](std::span<const typename call_type::emitted_draw> emitted) {
-                    return voxelize_solid(backend, emitted, g, out, options);
-                });
+            return core::run_at_once<true>(backend, draws, core::position_outside(g), [&](const auto& emitted) {
+                return voxelize_solid(backend, emitted, g, out, options);
             });
         }
     }

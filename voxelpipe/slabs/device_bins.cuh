@@ -59,7 +59,7 @@ struct layer_counter {
         }
         const classified c = classes(t);
         atomicAdd(words + static_cast<int>(c.kind), 1ull);
-        if (c.kind != core::triangle_class::drawn || c.reach.empty()) return;
+        if (!classes.by.how.takes(c.kind) || c.reach.empty()) return;
         unsigned long long* axis = words + count_words;
         for (int a = 0; a < 3; ++a) {
             const int layers = a == 0 ? classes.by.extent.x : a == 1 ? classes.by.extent.y : classes.by.extent.z;
@@ -83,8 +83,8 @@ struct slab_chooser {
         bool reaches = false;
         if (i < count) {
             const classified c = classes(classes.mesh.triangles[i]);
-            reaches = c.kind == core::triangle_class::drawn && !c.reach.empty() && c.reach.lo[axis] < end &&
-                      c.reach.hi[axis] >= begin;
+            reaches =
+                classes.by.how.takes(c.kind) && !c.reach.empty() && c.reach.lo[axis] < end && c.reach.hi[axis] >= begin;
             if (is_first_kept && i == 0) reaches = true;
         }
         stays[i] = reaches ? 1 : 0;

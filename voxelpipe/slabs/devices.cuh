@@ -129,7 +129,8 @@ public:
     [[nodiscard]] status draw_cells(const CellShader& shader, std::vector<Output>& outputs,
                                     const cell_options& how = {}) {
         if (const status s = core::validate(how); !s.ok()) return s;
-        if (!options_.is_solid || how.repair != options_.repair || how.cones != nullptr || how.axis != 0)
+        if (!options_.is_solid || options_.band || how.repair != options_.repair || how.cones != nullptr ||
+            how.axis != 0)
             return core::failure(status_code::bad_cell_options);
         solid_options holes;
         holes.repair = how.repair;
@@ -144,6 +145,29 @@ public:
             });
         if (s.ok() && repairs_) repairs_->count(s.solid);
         move_holes_to_cells(s);
+        return s;
+    }
+
+    // Draws distances: the values and the counts of one voxelize_distance. how.band is that of device_options, and
+    // how.repair too: none, close_holes or winding; how.cones are found here, as for draw_solid. Samples are centres.
+    // With band::whole each GPU has all triangles. The caller includes the module's header for GPUs (distance/device).
+    // Outputs are framebuffers or sparse framebuffers. bad_distance_options: other slabs or options.
+    template <class DistanceShader, class Output>
+    [[nodiscard]] status draw_distance(const DistanceShader& shader, std::vector<Output>& outputs,
+                                       const distance_options& how = {}) {
+        if (const status s = core::validate(how, grid_); !s.ok()) return s;
+        if (options_.band != how.band || how.repair != options_.repair || how.cones != nullptr ||
+            detail::resident_repairs::is_along_z(how.repair) || how.sample != sample::centre)
+            return core::failure(status_code::bad_distance_options);
+        const solid_options holes = core::sign_options(how);
+        if (const status s = find_repair(holes); !s.ok()) return s;
+        status s =
+            draw_each(shader, outputs, [&](cuda_backend& gpu, auto draws, const grid& g, Output& out, std::size_t i) {
+                distance_options of_slab = how;
+                if (repairs_) of_slab.cones = repairs_->of(i, holes).cones;
+                return voxelize_distance(gpu, draws, g, out, of_slab);
+            });
+        if (s.ok() && repairs_) repairs_->count(s.solid);
         return s;
     }
 
@@ -243,6 +267,7 @@ private:
     // Ok if the grid was cut for calls of this kind.
     template <class Output>
     [[nodiscard]] status accepts(bool solid) const {
+        if (options_.band) return core::failure(status_code::bad_distance_options);
         if (solid != options_.is_solid) return core::failure(status_code::bad_solid_options);
         if ((detail::is_abuffer<Output> || device::is_lists<Output>)&&plan_.axis != 2)
             return core::failure(status_code::bad_crop);
@@ -268,7 +293,7 @@ private:
         plan_options how;
         how.align = options_.align;
         how.may_turn = options_.may_turn && !detail::resident_repairs::is_along_z(options_.repair);
-        how.may_be_along_x = !options_.is_solid;
+        how.may_be_along_x = !options_.is_solid && !options_.band;
         how.triangle_cost = static_cast<std::uint64_t>(8 * options_.triangle_bytes); // in bits
         how.voxel_cost = static_cast<std::uint64_t>(8 * options_.voxel_bytes);
         plan_ = split(layers[0], static_cast<int>(n), how);
@@ -288,8 +313,7 @@ private:
         });
     }
     [[nodiscard]] detail::bin_rule rule() const {
-        const binning how{options_.voxelize.rule, options_.is_solid, options_.repair};
-        return {core::make_snap_transform(grid_), grid_.extent, how};
+        return {core::make_snap_transform(grid_), grid_.extent, options_.binning(grid_)};
     }
 
     // Begins the repair: what follows from the triangles alone.
@@ -366,12 +390,7 @@ private:
             one.fragments_before = all.counts.fragments;
             add_drawn(all, one.drawn);
         }
-        const counters drawn = all.counts;
-        all.counts = counts_;
-        all.counts.fragments = drawn.fragments;
-        all.counts.fragments_discarded = drawn.fragments_discarded;
-        all.counts.voxels = drawn.voxels;
-        return all;
+        return with_triangles(all, counts_);
     }
 
     // work(i, GPU) on the first `count` GPUs; the first failure.

@@ -96,12 +96,26 @@ public:
     [[nodiscard]] status draw_cells(const CellShader& shader, const Make& make, const Sink& sink,
                                     const cell_options& how = {}) {
         if (const status s = core::validate(how); !s.ok()) return s;
-        if (!options_.is_solid || how.repair != options_.repair || how.cones != nullptr || how.axis != 0)
+        if (!options_.is_solid || options_.band || how.repair != options_.repair || how.cones != nullptr ||
+            how.axis != 0)
             return core::failure(status_code::bad_cell_options);
         solid_options holes;
         holes.repair = how.repair;
         holes.max_hole_edges = how.max_hole_edges;
         return draw_with(false, &holes, [&](auto& stream) { return stream.draw_cells(shader, make, sink, how); });
+    }
+
+    // Every rank. As stream::draw_distance: the distances and the counts of one call. Holds what draw_solid holds for
+    // close_holes, and with band::whole all triangles on every rank.
+    template <class DistanceShader, class Make, class Sink>
+    [[nodiscard]] status draw_distance(const DistanceShader& shader, const Make& make, const Sink& sink,
+                                       const distance_options& how = {}) {
+        if (const status s = core::validate(how, grid_); !s.ok()) return s;
+        if (options_.band != how.band || how.repair != options_.repair || repairs_->is_along_z() ||
+            how.cones != nullptr || how.sample != sample::centre)
+            return core::failure(status_code::bad_distance_options);
+        const solid_options holes = core::sign_options(how);
+        return draw_with(false, &holes, [&](auto& stream) { return stream.draw_distance(shader, make, sink, how); });
     }
 
     // After draw(): the slabs, by rank.
@@ -229,17 +243,18 @@ private:
         MPI_Exscan(own.data(), below.data(), 2, MPI_UINT64_T, MPI_SUM, all_.comm());
         if (all_.me() == 0) below = {};
         before_ = {below[0], below[1]};
-        std::array<std::uint64_t, 11> sums{counts_.triangles_in,      counts_.triangles_nonfinite,
+        std::array<std::uint64_t, 12> sums{counts_.triangles_in,      counts_.triangles_nonfinite,
                                            counts_.triangles_too_far, counts_.triangles_zero_area,
                                            counts_.triangles_outside, counts_.triangles_drawn,
                                            drawn.counts.fragments,    drawn.counts.fragments_discarded,
                                            drawn.counts.voxels,       drawn.solid.open_rows,
-                                           drawn.solid.crossings};
+                                           drawn.solid.crossings,     drawn.distance.band_samples};
         MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(sums.size()), MPI_UINT64_T, MPI_SUM, all_.comm());
         status all;
         all.counts = {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], sums[8]};
         all.solid.open_rows = sums[9];
         all.solid.crossings = sums[10];
+        all.distance.band_samples = sums[11];
         add_up_cells(drawn.cells, all.cells);
         // Holes are those of the whole mesh on every rank that has a slab.
         std::array<std::uint64_t, 7> most{drawn.solid.max_winding, drawn.solid.hole_edges, drawn.solid.holes,

@@ -314,6 +314,16 @@ struct classified {
     return t;
 }
 
+// The status of the whole: what was drawn in all slabs, added up, and the counts of the triangles of the whole.
+[[nodiscard]] inline status with_triangles(status all, const counters& triangles) {
+    const counters drawn = all.counts;
+    all.counts = triangles;
+    all.counts.fragments = drawn.fragments;
+    all.counts.fragments_discarded = drawn.fragments_discarded;
+    all.counts.voxels = drawn.voxels;
+    return all;
+}
+
 // Adds what different slabs have drawn: fragments, voxels and rows. Their triangles are not added up.
 inline void add_drawn(status& all, const status& one) {
     all.counts.fragments += one.counts.fragments;

@@ -103,6 +103,10 @@ public:
     }
     // What stream_options::repair has found.
     [[nodiscard]] solid_repairs& repairs() { return repairs_; }
+    // Slabs are cut along z alone from now on, so that each has whole layers. They have to be along z (bad_crop).
+    void keep_layers() { keeps_layers_ = true; }
+    // Where slabs are drawn.
+    [[nodiscard]] Backend& backend() const { return backend_; }
     // Threads that work on the host.
     [[nodiscard]] unsigned threads() const { return threads_; }
 
@@ -243,9 +247,9 @@ private:
     [[nodiscard]] status draw_slabs(const Shader& shader, const Make& make, const Sink& sink, double share,
                                     const Call& call) {
         using output = std::remove_cvref_t<decltype(make(grid_.extent))>;
-        constexpr bool lists = detail::is_abuffer<output>;
-        if (lists && axis_ != 2) return core::failure(status_code::bad_crop);
-        if (!has_walls_) enqueue(lists || repairs_.is_along_z() ? 2 : Kind != kinds::surface ? 1 : 0);
+        const bool layers = detail::is_abuffer<output> || keeps_layers_;
+        if (layers && axis_ != 2) return core::failure(status_code::bad_crop);
+        if (!has_walls_) enqueue(layers || repairs_.is_along_z() ? 2 : Kind != kinds::surface ? 1 : 0);
         if constexpr (Kind != kinds::surface)
             if (repairs_.needs_walls() && !has_walls_) {
                 if (const status s = draw_walls(); !s.ok()) return s;
@@ -277,12 +281,7 @@ private:
                             });
         if (!s.ok()) return s;
         if constexpr (Kind != kinds::surface) repairs_.count(all.solid);
-        const counters drawn = all.counts;
-        all.counts = counts_;
-        all.counts.fragments = drawn.fragments;
-        all.counts.fragments_discarded = drawn.fragments_discarded;
-        all.counts.voxels = drawn.voxels;
-        return all;
+        return with_triangles(all, counts_);
     }
 
     // Puts the slabs into the queue. last_axis: that they may be cut along.
@@ -359,7 +358,7 @@ private:
     std::vector<bin<record_type>> bins_; // of these
     std::unique_ptr<bin_memory<record_type>> memory_;
     queue_type queue_; // while they are drawn
-    bool has_walls_ = false;
+    bool has_walls_ = false, keeps_layers_ = false;
 };
 
 namespace detail {

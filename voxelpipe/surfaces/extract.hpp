@@ -17,10 +17,11 @@ namespace voxelpipe {
 namespace core {
 
 // The cells that the surface passes and the crossings of a field, null for bits; then finish(cells, crossings, status
-// with counts). Options have been checked.
+// with counts, of which those of samples and crossings are those of the layers `counted`). Options have been checked.
 template <class Backend, class T, class Blend, class Layout, class Finish>
 [[nodiscard]] status extract_cells(Backend& backend, const target_view<target<T, Blend, Layout>>& from,
-                                   const extract_options& options, const Finish& finish) {
+                                   const extract_options& options, const Finish& finish,
+                                   const passes::counted_layers& counted = {}) {
     constexpr bool is_bit = std::is_same_v<T, bit>;
     static_assert(is_bit || std::is_same_v<T, float>, "voxelpipe: a surface is made of a target of bit or float");
     if (is_bit && options.level != 0.0) return failure(status_code::bad_surface_options);
@@ -38,7 +39,7 @@ template <class Backend, class T, class Blend, class Layout, class Finish>
             inside = from.elements;
         else
             backend.for_each(bits.size(), passes::read_samples<target_view<target<T, Blend, Layout>>>{
-                                              from, options.level, bits.data(), counts.data()});
+                                              from, options.level, bits.data(), counts.data(), counted});
         const surface_cells<Backend> cells(backend, inside, extent);
         if (cells.are_too_many()) return too_many_vertices(cells.num_vertices());
         status result;
@@ -46,9 +47,10 @@ template <class Backend, class T, class Blend, class Layout, class Finish>
             return finish(cells, nullptr, result);
         } else {
             typename Backend::template buffer<edge_crossing> crossings(backend, cells.num_edges());
-            backend.for_each(cells.count(),
-                             passes::cross_field<passes::cell_list, target_view<target<T, Blend, Layout>>>{
-                                 cells.list(), from, options.level, crossings.data(), counts.data() + 1});
+            backend.for_each(
+                cells.count(),
+                passes::cross_field<passes::cell_list, target_view<target<T, Blend, Layout>>>{
+                    cells.list(), from, options.level, crossings.data(), counts.data() + 1, counted.cells()});
             const std::vector<std::uint64_t> host = counts.to_host(backend);
             result.surface.nan_samples = host[0];
             result.surface.made_crossings = host[1];

@@ -84,10 +84,11 @@ namespace core {
     return o.repair == repair::vote ? fill_rule::even_odd : o.rule;
 }
 
-// The crossings of the mesh with the edges that its surface crosses.
+// The crossings of the mesh with the edges that its surface crosses; those of the layers of cells `counted` count.
 template <int Axis, class Backend, class Cells>
 void find_mesh_crossings(Backend& backend, const Cells& cells, const gathered_mesh<Backend>& mesh, const grid& samples,
-                         const remesh_options& options, edge_crossing* crossings, std::uint64_t* counts) {
+                         const remesh_options& options, edge_crossing* crossings, std::uint64_t* counts,
+                         const passes::counted_layers& counted) {
     using numbers = typename Backend::template buffer<std::uint64_t>;
     using words = typename Backend::template buffer<std::uint32_t>;
     const passes::row_keys<Axis> rows(samples.extent);
@@ -114,19 +115,31 @@ void find_mesh_crossings(Backend& backend, const Cells& cells, const gathered_me
     backend.sort_by_key(keys, found, rows.key_bits());
     numbers first_of_row(backend, Cells::is_sparse ? 0 : rows.rows() + 1); // in bricks nothing has the grid's size
     backend.for_each(first_of_row.size(), passes::find_rows{keys.data(), total, rows.bits, first_of_row.data()});
-    backend.for_each(cells.count(), passes::cross_mesh<Axis, typename Cells::list_type>{
-                                        cells.list(), triangles, rows, Cells::is_sparse ? nullptr : first_of_row.data(),
-                                        keys.data(), total, found.data(), crossing_rule(options),
-                                        options.bodies == bodies::draw, samples.fraction(), crossings, counts});
+    backend.for_each(cells.count(),
+                     passes::cross_mesh<Axis, typename Cells::list_type>{
+                         cells.list(), triangles, rows, Cells::is_sparse ? nullptr : first_of_row.data(), keys.data(),
+                         total, found.data(), crossing_rule(options), options.bodies == bodies::draw,
+                         samples.fraction(), crossings, counts, counted});
 }
 
+// What makes the surface of all cells: finish_surface.
+struct finish_whole {
+    template <class Backend, class Cells>
+    [[nodiscard]] status operator()(Backend& backend, const Cells& cells, const grid& samples,
+                                    const edge_crossing* crossings, const std::uint32_t* primitives,
+                                    const extract_options& options, surface<Backend>& out, const status& result) const {
+        return finish_surface(backend, cells, samples, crossings, primitives, options, out, result);
+    }
+};
+
 // The surface of cells between samples whose sign is known: the crossings of the mesh itself, then shade(mesh, cells,
-// crossings, counters), whose status counts where it is not ok. `result` is that of the sign.
-template <class Backend, class Mesh, class VertexShader, class Cells, class Shade>
-[[nodiscard]] status remesh_cells(Backend& backend,
-                                  std::span<const draw<Mesh, VertexShader, constant_output<bool>>> draws,
-                                  const grid& samples, const remesh_options& options, const Cells& cells,
-                                  surface<Backend>& out, const Shade& shade, status result) {
+// crossings, counters), whose status counts where it is not ok. `result` is that of the sign, `counted` are the layers
+// of cells whose crossings count, and `finish` is called as finish_whole.
+template <class Backend, class Mesh, class VertexShader, class Cells, class Shade, class Finish = finish_whole>
+[[nodiscard]] status
+remesh_cells(Backend& backend, std::span<const draw<Mesh, VertexShader, constant_output<bool>>> draws,
+             const grid& samples, const remesh_options& options, const Cells& cells, surface<Backend>& out,
+             const Shade& shade, status result, const passes::counted_layers& counted = {}, const Finish& finish = {}) {
     if (cells.are_too_many()) return too_many_vertices(cells.num_vertices());
     if (cells.count() == 0) {
         out = surface<Backend>(backend);
@@ -141,14 +154,15 @@ template <class Backend, class Mesh, class VertexShader, class Cells, class Shad
                                                             static_cast<std::size_t>(passes::edge_count::count));
     backend.for_each(counts.size(), passes::clear_counts{counts.data()});
     const gathered_mesh<Backend> mesh(backend, draws, samples, cones, options.bodies);
-    find_mesh_crossings<0>(backend, cells, mesh, samples, options, crossings.data(), counts.data());
-    find_mesh_crossings<1>(backend, cells, mesh, samples, options, crossings.data(), counts.data());
-    find_mesh_crossings<2>(backend, cells, mesh, samples, options, crossings.data(), counts.data());
+    find_mesh_crossings<0>(backend, cells, mesh, samples, options, crossings.data(), counts.data(), counted);
+    find_mesh_crossings<1>(backend, cells, mesh, samples, options, crossings.data(), counts.data(), counted);
+    find_mesh_crossings<2>(backend, cells, mesh, samples, options, crossings.data(), counts.data(), counted);
     const std::vector<std::uint64_t> host = counts.to_host(backend);
     result.surface.cone_crossings = host[static_cast<std::size_t>(passes::edge_count::on_cones)];
     result.surface.made_crossings = host[static_cast<std::size_t>(passes::edge_count::made)];
-    result = finish_surface(backend, cells, samples, crossings.data(), mesh.view().primitives,
-                            extract_options_of(options), out, result);
+    result = finish(backend, cells, samples, crossings.data(), mesh.view().primitives, extract_options_of(options), out,
+                    result);
+    if (!result.ok()) return result;
     const status shaded = shade(mesh.view(), &cells, crossings.data(), result.surface);
     return shaded.ok() ? result : shaded;
 }
@@ -246,10 +260,11 @@ template <class Mesh, class VertexShader, class Shader, class... Values>
     }
 }
 
-// Runs a remesh; Way::run takes the draws with constant(true) for the surface itself, with distance for a level.
+// Runs a remesh; way.run takes the draws with constant(true) for the surface itself, with distance for a level.
 template <class Way, class Backend, class Mesh, class VertexShader, class Shader, class... Values>
 [[nodiscard]] status run_remesh(Backend& backend, std::span<const draw<Mesh, VertexShader, Shader>> draws,
-                                const grid& g, surface<Backend, Values...>& out, const remesh_options& options) {
+                                const grid& g, surface<Backend, Values...>& out, const remesh_options& options,
+                                const Way& way = {}) {
     if constexpr (makes_values<Mesh, VertexShader, Shader, Values...>()) {
         if (const status s = voxelpipe::validate(g); !s.ok()) return s;
         if (const status s = validate(options, g); !s.ok()) return s;
@@ -261,8 +276,8 @@ template <class Way, class Backend, class Mesh, class VertexShader, class Shader
             const auto run = [&]<class Drawn>(const Drawn& shader) {
                 std::vector<draw<Mesh, VertexShader, Drawn>> drawn;
                 for (const auto& d : draws) drawn.push_back({d.mesh, d.vertex_shader, shader});
-                return Way::run(backend, std::span<const draw<Mesh, VertexShader, Drawn>>(drawn), g, options, made,
-                                shade);
+                return way.run(backend, std::span<const draw<Mesh, VertexShader, Drawn>>(drawn), g, options, made,
+                               shade);
             };
             const status result = options.level != 0.0 ? run(distance{}) : run(constant(true));
             if (result.ok()) out = std::move(made);

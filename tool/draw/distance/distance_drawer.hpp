@@ -54,6 +54,11 @@ namespace voxelize {
     return options;
 }
 
+// False where no triangle of the model can be measured from; of stats that count them.
+[[nodiscard]] inline bool has_triangles_to_measure(const voxelize_stats& stats) {
+    return stats.triangles != 0 && stats.triangles_dropped != stats.triangles;
+}
+
 // The number of a nearest triangle for people.
 template <class T>
 struct nearest_number {
@@ -64,6 +69,8 @@ struct nearest_number {
     }
 };
 
+// Draws the field of the request's grid, as often as it is asked to. Between two fields the request may go on to
+// another crop of the whole grid. Adds the counts.
 template <class Backend>
 class distance_drawer {
 public:
@@ -88,7 +95,7 @@ public:
             draw_plain(result, voxels);
         else
             draw_nearest(result, voxels);
-        if (has_triangles()) {
+        if (has_triangles_to_measure(stats_)) {
             read_back();
             if (numbers) resolve_numbers(result);
         } else {
@@ -106,10 +113,6 @@ private:
                                               vp::target<glm::vec3, vp::blend::replace>, distance_target>;
 
     [[nodiscard]] bool wants(target id) const { return wanted_[static_cast<std::size_t>(id)]; }
-
-    [[nodiscard]] bool has_triangles() const {
-        return stats_.triangles != 0 && stats_.triangles_dropped != stats_.triangles;
-    }
 
     // Where a channel's values are drawn: the channel itself in host memory, otherwise a buffer that read_back()
     // copies. Null where the volume does not have the channel.
@@ -160,22 +163,21 @@ private:
         if (status.code == vp::status_code::out_of_memory) throw std::bad_alloc{};
         status.or_throw();
         stats_.triangles_dropped = status.counts.triangles_dropped();
-        stats_.triangles_drawn = status.counts.triangles_drawn;
-        stats_.triangles_flat = status.counts.triangles_zero_area;
-        stats_.fragments = status.counts.fragments;
-        stats_.voxels = status.distance.band_samples;
+        stats_.triangles_drawn += status.counts.triangles_drawn;
+        stats_.triangles_flat += status.counts.triangles_zero_area;
+        stats_.fragments += status.counts.fragments;
+        stats_.voxels += status.distance.band_samples;
         if (!request_.distance->is_signed) return;
-        solid_counts& counts = stats_.solid.emplace();
-        counts.rows =
+        if (!stats_.solid) stats_.solid.emplace();
+        solid_counts& counts = *stats_.solid;
+        counts.rows +=
             static_cast<std::uint64_t>(request_.grid.extent.y) * static_cast<std::uint64_t>(request_.grid.extent.z);
-        counts.open_rows = status.solid.open_rows;
-        counts.crossings = status.solid.crossings;
-        counts.max_winding = status.solid.max_winding;
+        counts.open_rows += status.solid.open_rows;
+        counts.crossings += status.solid.crossings;
+        counts.max_winding = std::max(counts.max_winding, status.solid.max_winding);
         counts.hole_edges = status.solid.hole_edges;
         counts.holes = status.solid.holes;
         counts.closed_holes = status.solid.cones;
-        if (std::string warning = open_warning(request_.distance->sign, counts); !warning.empty())
-            stats_.warnings.push_back("the sign of --distance: " + warning);
     }
 
     // The values of samples that have no triangle. Without draws the library clears, which is not the band's distance.
@@ -189,9 +191,6 @@ private:
             for (std::size_t at = 0; at < c.data.size(); at += sizeof(value))
                 std::memcpy(c.data.data() + at, &value, sizeof(value));
         }
-        stats_.warnings.push_back(
-            "there is no triangle to measure from: every sample is " +
-            (std::isfinite(result.distances->band) ? "the band's distance away" : std::string("infinitely far away")));
     }
 
     void resolve_numbers(volume& result) {

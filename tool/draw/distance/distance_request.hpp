@@ -16,6 +16,8 @@ struct distance_request {
     std::optional<double> iso; // of the level that pictures show, world units; none: 0
     bool is_signed = true;     // negative inside, by `sign`
     solid_request sign;        // the rule and the repair; its extent says nothing
+    // All outputs take the field piece by piece, from slabs of a multiple of this many layers; 0: one needs it whole.
+    int slab_layers = 0;
 };
 
 } // namespace voxelize

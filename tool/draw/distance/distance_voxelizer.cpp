@@ -12,8 +12,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <memory>
+#include <mutex>
 #include <new>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -53,27 +57,164 @@ double distance_need(const scene& model, const voxelize_request& request) {
     return bytes;
 }
 
+namespace {
+
+// The request of some layers of its grid.
+voxelize_request request_of_layers(const voxelize_request& request, int begin, int end) {
+    voxelize_request part = request;
+    part.grid = request.grid.crop({0, 0, begin}, {request.grid.extent.x, request.grid.extent.y, end - begin});
+    return part;
+}
+
+// A model whose field is drawn slab by slab on the CPU, as its values are asked for. Two slabs are kept, so that
+// threads that read near each other find theirs.
+class late_distances {
+public:
+    // layers: of a slab. stats: as of run_distance_voxelizer.
+    late_distances(scene&& model, const voxelize_request& request, int layers, voxelize_stats& stats)
+        : model_(std::move(model)), request_(request), whole_(request.grid), layers_(layers),
+          stats_(stats), on_{static_cast<unsigned>(thread_count(request.threads))},
+          drawer_(on_, model_, request_, stats),
+          is_counted_(static_cast<std::size_t>((whole_.extent.z + layers - 1) / layers)) {
+        request_.progress = nullptr; // that of the outputs goes on
+    }
+
+    // Values of a channel of the field, from number `first` on. Any thread may call it.
+    void read(std::size_t channel, std::uint64_t first, std::span<std::byte> to) {
+        const std::lock_guard lock(mutex_);
+        const std::uint64_t layer =
+            static_cast<std::uint64_t>(whole_.extent.x) * static_cast<std::uint64_t>(whole_.extent.y);
+        while (!to.empty()) {
+            const std::size_t slab = static_cast<std::size_t>(first / layer) / static_cast<std::size_t>(layers_);
+            const volume& v = slab_of(slab);
+            const auto& data = v.channels[channel].data;
+            const std::uint64_t values = static_cast<std::uint64_t>(v.num_voxels()),
+                                skipped = first - slab * static_cast<std::uint64_t>(layers_) * layer;
+            const std::size_t each = data.size() / static_cast<std::size_t>(values);
+            const std::size_t count = std::min(to.size() / each, static_cast<std::size_t>(values - skipped));
+            std::memcpy(to.data(), data.data() + static_cast<std::size_t>(skipped) * each, count * each);
+            to = to.subspan(count * each);
+            first += count;
+        }
+    }
+    [[nodiscard]] std::size_t num_slabs() const { return is_counted_.size(); }
+
+private:
+    struct kept {
+        std::size_t slab = SIZE_MAX;
+        volume field;
+    };
+
+    // Draws it, unless it is kept. What is drawn again is not counted again.
+    const volume& slab_of(std::size_t slab) {
+        if (kept_[1].slab == slab) std::swap(kept_[0], kept_[1]);
+        if (kept_[0].slab == slab) return kept_[0].field;
+        kept_[1] = {};
+        std::swap(kept_[0], kept_[1]);
+        const int begin = static_cast<int>(slab) * layers_, end = std::min(whole_.extent.z, begin + layers_);
+        request_.grid = whole_.crop({0, 0, begin}, {whole_.extent.x, whole_.extent.y, end - begin});
+        const voxelize_stats before = stats_;
+        kept_[0].field = drawer_.run();
+        kept_[0].slab = slab;
+        if (is_counted_[slab] != 0) stats_ = before;
+        is_counted_[slab] = 1;
+        return kept_[0].field;
+    }
+
+    scene model_;
+    voxelize_request request_;
+    voxelpipe::grid whole_;
+    int layers_;
+    voxelize_stats& stats_;
+    vp::cpu_backend on_;
+    distance_drawer<vp::cpu_backend> drawer_;
+    std::vector<char> is_counted_;
+    kept kept_[2];
+    std::mutex mutex_;
+};
+
+// Layers of slabs of which two fit, a multiple of distance_request::slab_layers; none: the field is drawn at once.
+// Throws memory_error where it cannot be.
+std::optional<int> layers_of_slabs(const scene& model, const voxelize_request& request, double need) {
+    const distance_request& distance = *request.distance;
+    const glm::ivec3 extent = request.grid.extent;
+    const auto room = static_cast<double>(memory::room());
+    constexpr double used = 0.75; // of the room, by estimate: what slabs of less take beside is not all known
+    const int step = distance.slab_layers;
+    const bool sees_all = distance.is_signed && distance.sign.rule == solid_rule::exterior;
+    const bool has_slabs =
+        step > 0 && extent.z > step && !distance.at_corners && !sees_all && request.backend != backend_choice::cuda;
+    const auto need_of = [&](int layers) {
+        const voxelize_request part = request_of_layers(request, 0, std::min(extent.z, layers));
+        return distance_need(model, part) + volume_bytes(part);
+    };
+    std::string what = std::string(distance.is_whole ? "a whole distance field of " : "a distance field of ") +
+                       std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " + std::to_string(extent.z) +
+                       " samples";
+    if (need <= room || !has_slabs) {
+        memory::expect(need);
+        memory::require(need, what, memory::fewer_voxels_hint, need);
+        return std::nullopt;
+    }
+    int steps = 1; // the need grows with the layers
+    for (int more = (extent.z - 1) / step; more > 0; more /= 2)
+        while (steps + more < (extent.z + step - 1) / step && need_of((steps + more) * step) <= used * room)
+            steps += more;
+    const double need_of_slabs = need_of(steps * step);
+    memory::expect(need_of_slabs);
+    memory::require(need_of_slabs, what + ", in slabs of " + std::to_string(steps * step) + " layers",
+                    memory::fewer_voxels_hint, need_of_slabs);
+    return steps * step;
+}
+
+} // namespace
+
+bool is_drawn_late(const volume& v) { return !v.channels.empty() && v.channels.front().read != nullptr; }
+
+void add_distance_warnings(const voxelize_request& request, voxelize_stats& stats) {
+    if (stats.solid)
+        if (std::string warning = open_warning(request.distance->sign, *stats.solid); !warning.empty())
+            stats.warnings.push_back("the sign of --distance: " + warning);
+    if (!has_triangles_to_measure(stats))
+        stats.warnings.push_back(
+            "there is no triangle to measure from: every sample is " +
+            std::string(request.distance->is_whole ? "infinitely far away" : "the band's distance away"));
+}
+
 volume run_distance_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
     const double need = distance_need(model, request);
-    const glm::ivec3 extent = request.grid.extent;
-    memory::expect(need);
-    memory::require(need,
-                    std::string(request.distance->is_whole ? "a whole distance field of " : "a distance field of ") +
-                        std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " + std::to_string(extent.z) +
-                        " samples",
-                    memory::fewer_voxels_hint, need);
+    const std::optional<int> layers = layers_of_slabs(model, request, need);
     if (const std::uint64_t lines = model.line_count(); lines != 0)
         stats.warnings.push_back(std::to_string(lines) +
                                  " line(s) and point(s) have no distances: --distance leaves them out");
     if (request.devices != 1) throw backend_error("--devices: one GPU draws distances");
     try {
         stats.triangles = model.triangle_count();
+        if (layers) {
+            stats.backend = "cpu";
+            stats.threads = thread_count(request.threads);
+            volume field = volume_of(request.grid);
+            field.distances = distance_field{vp::core::band_distance(options_of(*request.distance).band, request.grid),
+                                             request.distance->is_signed};
+            const auto drawn = std::make_shared<late_distances>(std::move(model), request, *layers, stats);
+            stats.slabs = static_cast<int>(drawn->num_slabs());
+            for (std::size_t c = 0; c < request.targets.size(); ++c) {
+                const target_info& info = info_of(request.targets[c]);
+                field.channels.push_back({std::string(info.name), info.type, info.components, {}});
+                field.channels.back().read = [drawn, c](std::uint64_t first, std::span<std::byte> to) {
+                    drawn->read(c, first, to);
+                };
+            }
+            return field;
+        }
         if (request.backend != backend_choice::cpu)
             if (std::optional<volume> drawn = draw_on_cuda(model, request, false, stats,
                                                            [&](const cuda_facts& facts, const voxelize_request& how) {
                                                                return distances_on_cuda(facts, model, how, stats);
-                                                           }))
+                                                           })) {
+                add_distance_warnings(request, stats);
                 return std::move(*drawn);
+            }
         const int threads = thread_count(request.threads);
         vp::cpu_backend on{static_cast<unsigned>(threads)};
         if (request.progress)
@@ -82,7 +223,9 @@ volume run_distance_voxelizer(scene&& model, const voxelize_request& request, vo
             };
         stats.backend = "cpu";
         stats.threads = threads;
-        return draw_distances(on, model, request, stats);
+        volume field = draw_distances(on, model, request, stats);
+        add_distance_warnings(request, stats);
+        return field;
     } catch (const std::bad_alloc&) {
         throw memory_error(memory::shortage(memory::fewer_voxels_hint, need));
     }

@@ -26,6 +26,12 @@ constexpr double thread_bytes = 1 << 20, tile_voxels = 32768, tile_sums = 2.5;
 // Voxels of a surface in the tiles whose values each thread collects at once.
 constexpr double list_voxels = 32 * 1200, list_growth = 1.5;
 
+// With what lists take beyond what they hold, and what the heap keeps.
+double with_lists(double need) {
+    constexpr double more = 1.03, least_more = 2 << 20;
+    return more * need + least_more;
+}
+
 } // namespace
 
 surface_layers::surface_layers(const voxelpipe::grid& part)
@@ -124,9 +130,66 @@ double needed_bytes(const voxelize_request& request, const surface_layers& surfa
     const double result = held_brick * bricks + bytes.values * written_voxels;
     const double in_tiles = request.solid ? std::max(0.0, std::abs(surface.volume()) - written_voxels) : 0;
     if (request.write_bytes) need = std::max(need, result + request.write_bytes(bricks, written_voxels, in_tiles));
-    // What lists take beyond what they hold, and what the heap keeps.
-    constexpr double more = 1.03, least_more = 2 << 20;
-    return more * need + least_more;
+    return with_lists(need);
+}
+
+namespace {
+
+// What is drawn, and what is there to be written.
+struct drawn_cells {
+    double drawn = 0, result = 0; // bytes
+    double bricks = 0, voxels = 0, in_tiles = 0;
+};
+
+// Rows of the voxels that a link is crossed of, which lie on both sides of the surface. A voxel that this touches has
+// as many crossings as where it is a plane across an axis, at most.
+drawn_cells drawn_links(const voxelize_request& request, const brick_counts& counts) {
+    constexpr double listed = 24, found = 20;              // of a crossing: while they are sorted, and then
+    constexpr double voxel = 12, link = 12, place = 20;    // of the library's rows, and while these are put in order
+    constexpr double sides = 2.2, bricks = 1.5, value = 4; // of the result
+    const double links = request.neighbours, crossings = (request.neighbours == 18 ? 10 : 18) * counts.voxels;
+    drawn_cells cells{0, 0, bricks * counts.bricks, sides * counts.voxels, 0};
+    const double rows = (voxel + link * links) * cells.voxels;
+    cells.result =
+        held_brick * cells.bricks + value * links * static_cast<double>(request.targets.size()) * cells.voxels;
+    cells.drawn = std::max({listed * crossings, found * crossings + rows, rows + place * cells.voxels + cells.result});
+    return cells;
+}
+
+// Half of each brick of the surface is inside, and the rest is tiles.
+drawn_cells drawn_fractions(const voxelize_request& request, const surface_layers& surface,
+                            const brick_counts& counts) {
+    constexpr double half_a_brick = 256, run = 28, runs_of_voxel = 1.5;
+    const bool has_area = request.wants(target::area), has_centroid = request.wants(target::centroid);
+    // A triangle meets voxels by its area, by its edges and by itself.
+    const double triangles = surface.primitives();
+    const double pairs = surface.voxels() + 2 * std::sqrt(surface.voxels() * triangles) + triangles;
+    const bool measures = has_area || has_centroid;
+    const double sorted = (measures ? 128 : 56) * pairs, listed = (measures ? 104 : 34) * pairs;
+    const double targets = 4 + (has_area ? 4 : 0) + (has_centroid ? 12 : 0);
+    drawn_cells cells{0, 0, counts.bricks, half_a_brick * counts.bricks, 0};
+    cells.in_tiles = std::max(0.0, std::abs(surface.volume()) - cells.voxels);
+    cells.result = held_brick * cells.bricks + value_sizes_of(request, 0).values * cells.voxels;
+    const double of_runs = run * runs_of_voxel * counts.voxels + listed_brick * cells.bricks;
+    const double values = targets * cells.voxels;
+    cells.drawn = std::max({sorted, listed + of_runs + values, held_brick * cells.bricks + cells.result + values});
+    return cells;
+}
+
+} // namespace
+
+double needed_for_cells(const voxelize_request& request, const surface_layers& surface, const brick_counts& counts,
+                        double vertices) {
+    constexpr double of_vertex = 24, of_triangle = 36, of_edges = 72;
+    const double triangles = surface.primitives();
+    double before = request.wants_links() ? 0 : of_edges * triangles;
+    if (request.close_holes != 0) before = std::max(before, 40 * vertices + 36 * triangles); // on the host
+    const drawn_cells cells =
+        request.wants_links() ? drawn_links(request, counts) : drawn_fractions(request, surface, counts);
+    double need = of_vertex * vertices + of_triangle * triangles + std::max(before, cells.drawn);
+    if (request.write_bytes)
+        need = std::max(need, cells.result + request.write_bytes(cells.bricks, cells.voxels, cells.in_tiles));
+    return with_lists(need);
 }
 
 int counted_side(const surface_layers& surface) {

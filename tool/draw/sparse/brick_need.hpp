@@ -64,6 +64,10 @@ inline constexpr double drawn_brick_bytes = 160;
 [[nodiscard]] double needed_bytes(const voxelize_request& request, const surface_layers& surface,
                                   const brick_counts& counts, const value_sizes& bytes);
 
+// The same need, of cut cells or of links. vertices: of all instances.
+[[nodiscard]] double needed_for_cells(const voxelize_request& request, const surface_layers& surface,
+                                      const brick_counts& counts, double vertices);
+
 // The side in voxels of the cubes that are counted in place of voxels, so that counting takes about a second: 1, or a
 // multiple of a brick's side.
 [[nodiscard]] int counted_side(const surface_layers& surface);

@@ -9,6 +9,8 @@
 #include "sparse_pipeline.hpp"
 #include "sparse_solid.hpp"
 
+#include <voxelpipe/cells/links.hpp>
+
 #include <algorithm>
 #include <bitset>
 #include <cstddef>
@@ -132,6 +134,9 @@ bool sparse_pipeline<Backend>::draw_surface(sparse_volume& result, const voxelpi
         case target::area_vector:
         case target::area:
         case target::centroid:
+        case target::links:
+        case target::link_triangle:
+        case target::link_material:
         case target::aperture_x:
         case target::aperture_y:
         case target::aperture_z:
@@ -292,6 +297,7 @@ struct measures_anywhere {
 
 template <class Backend>
 sparse_volume sparse_pipeline<Backend>::draw_cells(const voxelpipe::grid& whole) {
+    require_cells();
     sparse_volume result;
     result.shape = volume_of(whole);
     report_from(0, 1, 0, 1);
@@ -337,6 +343,51 @@ sparse_volume sparse_pipeline<Backend>::draw_cells(const voxelpipe::grid& whole)
                 return clamps ? std::clamp(fractions[i], 0.0F, 1.0F) : fractions[i];
             });
     }
+    return result;
+}
+
+template <class Backend>
+sparse_volume sparse_pipeline<Backend>::draw_links(const voxelpipe::grid& whole) {
+    require_cells();
+    sparse_volume result;
+    result.shape = volume_of(whole);
+    report_from(0, 1, 0, 1);
+    vp::link_list<Backend> links(this->backend_);
+    vp::status status;
+    {
+        const typename base::stage_timer timer{*this, "links"};
+        status = vp::voxelize_links(this->backend_, this->uploaded_->bits_draws(),
+                                    this->uploaded_->relative_grid().uncropped(), links,
+                                    vp::link_options{this->request_.neighbours});
+    }
+    this->check(status, this->request_);
+    this->stats_.triangles_dropped = status.counts.triangles_dropped();
+    this->add_counts(status);
+    this->stats_.slabs = 1;
+    const typename base::stage_timer timer{*this, "resolve"};
+    const std::vector<std::uint32_t> places = set_voxels(result, {links.voxels.data(), links.size()});
+    const auto columns = static_cast<std::size_t>(links.neighbours);
+    for (const target wanted : this->request_.targets) {
+        channel& c = add_channel(result, wanted);
+        c.components = links.neighbours;
+        c.data.resize(columns * places.size() * sizeof(float));
+        const auto fill = [&](const auto& value) {
+            using type = decltype(value(std::size_t{0}));
+            memory_access<Backend>::read(
+                this->backend_, reinterpret_cast<type*>(c.data.data()), columns * places.size(),
+                [&](std::size_t i) { return value(columns * places[i / columns] + i % columns); },
+                thread_count(this->request_.threads));
+        };
+        if (wanted == target::links) fill([&](std::size_t i) { return links.q.data()[i]; });
+        if (wanted == target::link_triangle)
+            fill([&](std::size_t i) { return static_cast<std::int32_t>(links.primitives.data()[i]); });
+        if (wanted == target::link_material)
+            fill([&](std::size_t i) {
+                const std::uint32_t draw = links.draws.data()[i];
+                return draw == vp::no_crossing ? -1 : this->uploaded_->draw_table()[draw].material;
+            });
+    }
+    report_from(0, 1, 1, 1);
     return result;
 }
 

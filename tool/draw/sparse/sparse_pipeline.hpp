@@ -38,8 +38,10 @@ public:
         : base(backend, model, request, stats), model_{model} {}
 
     [[nodiscard]] sparse_volume run(const voxelpipe::grid& whole) override {
-        if constexpr (memory_access<Backend>::on_host)
+        if constexpr (memory_access<Backend>::on_host) {
+            if (this->request_.wants_links()) return draw_links(whole);
             if (this->request_.wants_cells()) return draw_cells(whole);
+        }
         require_part();
         sparse_volume result = surface_in(whole, this->num_passes());
         if (!this->request_.solid) return result;
@@ -110,12 +112,29 @@ private:
             value_sizes_of(request, this->only_bits_ ? (this->counts_fragments() ? 4 : 0.125)
                                                      : static_cast<double>(this->surface_voxel_bytes()));
         if (this->bodies_ && !this->bodies_->is_everywhere()) bytes.bodies = body_map::brick_bytes;
-        if (2 * needed_bytes(request, surface, at_most(surface), bytes) < static_cast<double>(memory::room())) return;
+        require_counted(surface, request.solid ? voxelpipe::coverage::conservative : request.coverage,
+                        [&](const brick_counts& counts) { return needed_bytes(request, surface, counts, bytes); });
+    }
+    // As require_part(), for cut cells and for links.
+    void require_cells() {
+        const typename base::stage_timer timer{*this, "estimate"};
+        const surface_layers& surface = surface_here();
+        double vertices = 0;
+        for (const auto& d : this->uploaded_->bits_draws())
+            vertices += static_cast<double>(d.mesh.positions.size()) * static_cast<double>(d.mesh.copies.count);
+        require_counted(surface, voxelpipe::coverage::conservative, [&](const brick_counts& counts) {
+            return needed_for_cells(this->request_, surface, counts, vertices);
+        });
+    }
+    // need(counts): the bytes that these counts come to. They are counted where twice the most that they can be does
+    // not fit.
+    template <class Need>
+    void require_counted(const surface_layers& surface, voxelpipe::coverage rule, const Need& need) {
+        if (2 * need(at_most(surface)) < static_cast<double>(memory::room())) return;
         const int side = counted_side(surface);
-        const std::optional<brick_counts> counted =
-            count_touched(counted_grid(this->uploaded_->relative_grid(), side),
-                          side == 1 && !request.solid ? request.coverage : voxelpipe::coverage::conservative);
-        if (counted) require_bricks(request, needed_bytes(request, surface, counts_of(surface, *counted, side), bytes));
+        const std::optional<brick_counts> counted = count_touched(counted_grid(this->uploaded_->relative_grid(), side),
+                                                                  side == 1 ? rule : voxelpipe::coverage::conservative);
+        if (counted) require_bricks(this->request_, need(counts_of(surface, *counted, side)));
     }
     // The surface in the request's part of the grid, which is looked at once for each part.
     [[nodiscard]] const surface_layers& surface_here() {
@@ -225,6 +244,8 @@ private:
     [[nodiscard]] sparse_volume draw_solid(sparse_volume&& surface_of);
     // What is cut or inside, in one call for the whole grid; on the CPU alone.
     [[nodiscard]] sparse_volume draw_cells(const voxelpipe::grid& whole);
+    // The voxels of which links are crossed, those of the padding too; on the CPU alone.
+    [[nodiscard]] sparse_volume draw_links(const voxelpipe::grid& whole);
 
     template <class Framebuffer>
     void take_bricks(sparse_volume& result, const Framebuffer& framebuffer) {

@@ -197,6 +197,11 @@ void describe_values(CLI::App& app, command_line& options, raw_options& raw) {
         ->group("Coverage and values");
     app.add_flag("--clamp", options.voxelize.clamp, "Fractions below 0 become 0, those above 1 become 1")
         ->group("Coverage and values");
+    app.add_option("--neighbours", raw.neighbours,
+                   "With --target links: the links of a voxel, 18 through faces and edges or 26 with corners. Default: "
+                   "18")
+        ->option_text("18|26")
+        ->group("Coverage and values");
 }
 
 void describe_solids(CLI::App& app, raw_options& raw) {

@@ -38,6 +38,7 @@ struct raw_options {
     bool embedded = false;
     bool report = false;
     std::optional<double> threshold;
+    std::optional<int> neighbours;
     std::vector<std::string> targets;
     bool no_edges = false;
     bool no_ground = false;

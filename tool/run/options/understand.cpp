@@ -391,10 +391,39 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     options.load.gltf.blend_cuts = options.voxelize.alpha == blend_alpha::cutoff;
 }
 
+namespace {
+
+// Links are lists of their own.
+void understand_links(command_line& options, const raw_options& raw) {
+    voxelize_request& request = options.voxelize;
+    if (const int links = raw.neighbours.value_or(18); links != 18 && links != 26)
+        throw usage_error("--neighbours is 18 or 26, not " + std::to_string(links));
+    request.neighbours = raw.neighbours.value_or(18);
+    for (const std::filesystem::path& output : options.outputs)
+        if (const std::string_view of = find_format(output)->extension; of != ".npy" && of != ".npz")
+            throw usage_error('"' + output.string() +
+                              "\": it holds voxels; .npz and .npy take the lists of --target links");
+    for (const target id : request.targets)
+        if (!is_of_links(id))
+            throw usage_error("--target links lists the ends of links: link_triangle and link_material go with it, " +
+                              std::string(info_of(id).name) + " does not");
+    if (!request.wants(target::links))
+        throw usage_error("--target " + name_of_cells(request) + " goes with --target links");
+    if (request.solid) throw usage_error("--solid and --target links do not go together: the surface is crossed");
+    if (!raw.close_holes.empty())
+        throw usage_error("--close-holes and --target links do not go together: the model is crossed as it is");
+    if (options.storage == storage_choice::dense)
+        throw usage_error("--dense and --target links do not go together: links are lists");
+    options.storage = storage_choice::sparse;
+}
+
+} // namespace
+
 void understand_fractions(command_line& options, const raw_options& raw) {
     const voxelize_request& request = options.voxelize;
     if (!raw.close_holes.empty() && !request.solid && !request.distance && !request.remesh && !request.wants_cells())
         throw usage_error("--close-holes goes with --solid, or with --target fraction and its like");
+    if (raw.neighbours && !request.wants_links()) throw usage_error("--neighbours goes with --target links");
     if (!request.wants(target::fraction)) {
         if (request.clamp) throw usage_error("--clamp goes with --target fraction");
         if (raw.threshold) throw usage_error("--threshold goes with --target fraction");
@@ -414,7 +443,9 @@ void understand_fractions(command_line& options, const raw_options& raw) {
     if (!raw.close_holes.empty()) options.voxelize.close_holes = edges_of_holes(raw);
     if (request.alpha == blend_alpha::cutoff)
         throw usage_error("--alpha cutoff" + together + "what is inside follows from whole triangles");
-    if (options.storage == storage_choice::sparse) {
+    if (request.wants_links()) {
+        understand_links(options, raw);
+    } else if (options.storage == storage_choice::sparse) {
         // What .nvdb and .vdb ask for is what their grid of fractions has.
         if (std::find(options.implied.begin(), options.implied.end(), target::occupancy) != options.implied.end() &&
             std::all_of(options.outputs.begin(), options.outputs.end(), [](const auto& output) {

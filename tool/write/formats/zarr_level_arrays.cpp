@@ -104,6 +104,9 @@ void with_rule(const channel& c, const F& f) {
     case target::area_vector:
     case target::area:
     case target::centroid:
+    case target::links:
+    case target::link_triangle:
+    case target::link_material:
     case target::aperture_x:
     case target::aperture_y:
     case target::aperture_z:

@@ -116,11 +116,24 @@ public:
 
     void count_open_edges() {
         const std::uint64_t edges = std::uint64_t{3} * triangles_.size();
+        const std::uint64_t vertices = positions_.size();
+        buffer<std::uint32_t> names(backend_, vertices);
+        {
+            buffer<std::uint64_t> keys(backend_, vertices);
+            buffer<std::uint32_t> order(backend_, vertices);
+            backend_.for_each(vertices, passes::hash_places{positions_.data(), keys.data(), order.data()});
+            backend_.sort_by_key(keys, order, passes::place_key_bits);
+            backend_.for_each(
+                vertices, passes::name_places{positions_.data(), keys.data(), order.data(), vertices, names.data()});
+        }
+        const int bits = static_cast<int>(std::bit_width(vertices)); // vertices are fewer than 2^32
         buffer<std::uint64_t> keys(backend_, edges);
-        buffer<std::uint32_t> order(backend_, edges);
-        backend_.for_each(edges, passes::hash_edges{mesh(), keys.data(), order.data()});
-        backend_.sort_by_key(keys, order, passes::edge_key_bits);
-        backend_.for_each(edges, passes::count_open_edges{mesh(), keys.data(), order.data(), edges, counts_.data()});
+        buffer<std::uint32_t> directions(backend_, edges);
+        backend_.for_each(edges,
+                          passes::key_edges{triangles_.data(), names.data(), bits, keys.data(), directions.data()});
+        backend_.sort_by_key(keys, directions, 2 * bits);
+        backend_.for_each(edges,
+                          passes::count_unmatched_edges{keys.data(), directions.data(), edges, bits, counts_.data()});
     }
 
     // The number of vertices through all draws and instances.

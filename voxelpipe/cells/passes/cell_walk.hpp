@@ -154,14 +154,25 @@ struct shade_cells {
     VOXELPIPE_ANY_CALLABLE
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         cell_tally tally;
-        blended_voxel voxel{fb, {}};
-        walk.template go<true>(i, i, tally, voxel);
+        blended_voxel voxel{fb, walk.axis, {}};
+        bool goes_by_runs = false; // whose voxels had one value before, and get one
+        if constexpr (ignores_voxel<CellShader>) goes_by_runs = is_cleared();
+        if constexpr (ignores_voxel<CellShader>)
+            if (goes_by_runs) walk.template go<false>(i, i, tally, voxel);
+        if (!goes_by_runs) walk.template go<true>(i, i, tally, voxel);
         tally.add_to(counts);
     }
 
 private:
+    [[nodiscard]] VOXELPIPE_HD bool is_cleared() const {
+        bool all = true;
+        for_each_index<sizeof...(Targets)>(
+            [&]<std::size_t I>() { all = all && voxelpipe::get<I>(fb.targets).load != load_operation::load; });
+        return all;
+    }
     struct blended_voxel {
         const framebuffer_view<Targets...>& fb;
+        int axis; // that runs lie along
         // What the targets sum a voxel's fragments in, which is rounded once.
         pack<decltype(Targets::traits::begin(typename Targets::value_type{}))...> sums;
 
@@ -185,17 +196,19 @@ private:
                 pack_element<I, Targets...>::type::traits::apply(voxelpipe::get<I>(sums), voxelpipe::get<I>(values));
             });
         }
-        VOXELPIPE_HD void end(const glm::ivec3& p, int, int) const {
+        VOXELPIPE_HD void end(const glm::ivec3& p, int first, int last) const {
             for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
                 using target_type = typename pack_element<I, Targets...>::type;
                 using map = typename target_type::map;
                 const auto& t = voxelpipe::get<I>(fb.targets);
                 if (t.load == load_operation::off) return;
                 const auto value = target_type::traits::end(voxelpipe::get<I>(sums));
-                if constexpr (map::is_bit)
-                    store_shared(t.elements[map::cell(t.extent, p.x, p.y, p.z)], 1u << (p.x & 31), value);
-                else
-                    map::store(t.elements, t.extent, p.x, p.y, p.z, value);
+                glm::ivec3 at = p;
+                for (int i = first; i < last; ++i, ++at[axis])
+                    if constexpr (map::is_bit)
+                        store_shared(t.elements[map::cell(t.extent, at.x, at.y, at.z)], 1u << (at.x & 31), value);
+                    else
+                        map::store(t.elements, t.extent, at.x, at.y, at.z, value);
             });
         }
     };

@@ -160,10 +160,12 @@ class program_call {
 public:
     using emitted_draw = draw<view_type, vertex_shader, typename shader::type>;
 
-    // Counts all triangles; state() tells whether the call can go on. Waits.
-    program_call(Backend& backend, std::span<const draw_type> draws, const grid& g, std::uint64_t chunk_triangles)
+    // Counts all triangles; state() tells whether the call can go on. outside: where triangles lie that are left out,
+    // position_outside or position_nowhere. Waits.
+    program_call(Backend& backend, std::span<const draw_type> draws, const glm::vec3& outside,
+                 std::uint64_t chunk_triangles)
         : backend_(backend), draws_(draws),
-          most_(std::clamp<std::uint64_t>(chunk_triangles, 1, std::uint64_t{1} << 30)), outside_(position_outside(g)),
+          most_(std::clamp<std::uint64_t>(chunk_triangles, 1, std::uint64_t{1} << 30)), outside_(outside),
           counts_(backend, array_view<const std::uint64_t>(zeros.data(), zeros.size())) {
         std::uint64_t total = 0;
         for (std::size_t d = 0; d < draws.size(); ++d) {
@@ -196,7 +198,8 @@ public:
                                           [&](std::uint64_t, mesh_type&& m) { meshes.back() = std::move(m); });
         }
         for (std::size_t d = 0; d < draws_.size(); ++d) emitted.push_back(draw_of_mesh(meshes[d], d, 0));
-        return without_left_out(run(std::span<const emitted_draw>(emitted)), left_out_);
+        const status s = run(std::span<const emitted_draw>(emitted));
+        return outside_.x == outside_.x ? without_left_out(s, left_out_) : without_left_out_nowhere(s, left_out_);
     }
     // Calls run(draw, first primitive) for each chunk, until a status is not ok.
     template <class Run>

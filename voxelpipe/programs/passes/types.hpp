@@ -46,8 +46,8 @@ struct program_types {
     using varyings = typename result::template varyings<>;
 };
 
-// Gives a fragment the numbers of the whole call. `origins`: input primitive of each triangle of the mesh that is
-// drawn.
+// Gives a fragment the numbers of the whole call: a surface's, or a distance's, which has some within the band alone.
+// `origins`: input primitive of each triangle of the mesh that is drawn.
 template <class FragmentShader>
 struct origin_shader {
     FragmentShader shader;
@@ -57,9 +57,11 @@ struct origin_shader {
     const std::uint32_t* moved = nullptr; // added to the primitives, in the backend's memory; null: nothing
 
     VOXELPIPE_ANY_CALLABLE
-    template <class V>
-    VOXELPIPE_HD auto operator()(const fragment<V>& drawn) const {
-        fragment<V> f = drawn;
+    template <class Fragment>
+    VOXELPIPE_HD auto operator()(const Fragment& drawn) const {
+        Fragment f = drawn;
+        if constexpr (requires { drawn.in_band; })
+            if (!drawn.in_band) return shader(f);
         const std::uint32_t origin = origins[drawn.triangle];
         f.triangle = origin % each;
         f.instance = origin / each;
@@ -95,6 +97,9 @@ struct emitted_shader<FragmentShader, V, true> {
     }
     return p;
 }
+
+// No position: for triangles that are left out of distances, because one outside the grid would be nearest somewhere.
+inline constexpr glm::vec3 position_nowhere(std::numeric_limits<float>::quiet_NaN());
 
 template <class Mesh, class VertexShader, class FragmentShader, class Amplify>
 [[nodiscard]] status validate_program_draws(std::span<const draw<Mesh, VertexShader, FragmentShader, Amplify>> draws) {
@@ -159,6 +164,12 @@ inline constexpr bool counts_left_out<tessellate_then_geometry<Tessellation, Geo
 [[nodiscard]] inline status without_left_out(status s, std::uint64_t left_out) {
     s.counts.triangles_in -= std::min(s.counts.triangles_in, left_out);
     s.counts.triangles_outside -= std::min(s.counts.triangles_outside, left_out);
+    return s;
+}
+// As without_left_out, for triangles at position_nowhere.
+[[nodiscard]] inline status without_left_out_nowhere(status s, std::uint64_t left_out) {
+    s.counts.triangles_in -= std::min(s.counts.triangles_in, left_out);
+    s.counts.triangles_nonfinite -= std::min(s.counts.triangles_nonfinite, left_out);
     return s;
 }
 

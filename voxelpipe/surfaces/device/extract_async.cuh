@@ -40,9 +40,17 @@ struct surface_result {
     const glm::uvec3* triangles = nullptr;    // counts->faces of them; null with `quads`
     const glm::uvec4* quads = nullptr;        // counts->faces of them; null without
     const surface_counters* counts = nullptr; // on the device; zeros where something does not fit
+    const std::uint32_t* sources = nullptr;   // of remesh_async, counts->vertices of them; null of extract_async
 };
 
 namespace device {
+
+// What finds the crossings of bits: nothing does, they lie in the middle of their edges.
+struct no_crossings {
+    static constexpr const std::uint32_t* primitives = nullptr; // of the crossings' triangles
+    void operator()(const core::passes::cell_list&, core::edge_crossing*, core::passes::bounded_surface*,
+                    cudaStream_t) const {}
+};
 
 // The memory of a call, in the order of its arrays, and its launches.
 template <class T, class Blend, class Layout>
@@ -53,7 +61,9 @@ class extract_call {
     static constexpr bool is_plain = is_bit && std::is_same_v<Layout, layout::linear>; // bits that passes read in place
 
 public:
-    extract_call(const view_type& from, const extract_options& options, const surface_limits& room, arena& memory)
+    // crosses_mesh: launch() is given what finds the crossings, and vertices have sources.
+    extract_call(const view_type& from, const extract_options& options, const surface_limits& room, arena& memory,
+                 bool crosses_mesh = false)
         : from_(from), options_(options), room_(room), grid_{{nullptr, from.extent.x, from.extent.y, from.extent.z}} {
         const std::uint64_t rows = grid_.rows(), cells = room.cells + 1, vertices = room.vertices + 1,
                             quads = room.quads + 1;
@@ -68,8 +78,9 @@ public:
         edges_ = memory.take<std::uint32_t>(cells);
         first_vertices_ = memory.take<std::uint64_t>(cells);
         first_edges_ = memory.take<std::uint64_t>(cells);
-        if (!is_bit) crossings_ = memory.take<core::edge_crossing>(quads);
+        if (!is_bit || crosses_mesh) crossings_ = memory.take<core::edge_crossing>(quads);
         vertices_ = memory.take<surface_vertex>(vertices);
+        if (crosses_mesh) sources_ = memory.take<std::uint32_t>(vertices);
         quads_ = memory.take<glm::uvec4>(quads);
         parents_ = memory.take<std::uint32_t>(vertices);
         kept_quads_ = memory.take<std::uint32_t>(quads);
@@ -79,6 +90,7 @@ public:
             quad_places_ = memory.take<std::uint64_t>(quads);
             left_vertices_ = memory.take<surface_vertex>(vertices);
             left_quads_ = memory.take<glm::uvec4>(quads);
+            if (crosses_mesh) left_sources_ = memory.take<std::uint32_t>(vertices);
         }
         if (!options.quads) triangles_ = memory.take<glm::uvec3>(2 * quads);
         scan_bytes_ = 0;
@@ -87,7 +99,10 @@ public:
         scan_ = memory.take<std::uint8_t>(scan_bytes_);
     }
 
-    void launch(cudaStream_t stream) const {
+    // find(cells, crossings, state, stream) writes the crossings of state->cells cells, or stops the call by zeros
+    // there.
+    template <class Find = no_crossings>
+    void launch(cudaStream_t stream, const Find& find = {}) const {
         using namespace core::passes;
         check(cudaMemsetAsync(state_, 0, sizeof(bounded_surface), stream));
         static const std::array<core::cell_sheets, table_size> table = core::make_cell_table();
@@ -122,8 +137,9 @@ public:
                 bounded<cross_field<cell_list, view_type>>{
                     {list, from_, options_.level, crossings_, &state_->counts.made_crossings}, &state_->cells},
                 stream);
+        find(list, crossings_, state_, stream);
         run(room_.cells,
-            bounded<place_vertices<cell_list>>{{list, options_.place, crossings_, vertices_, nullptr, nullptr},
+            bounded<place_vertices<cell_list>>{{list, options_.place, crossings_, vertices_, find.primitives, sources_},
                                                &state_->cells},
             stream);
         run(room_.cells, bounded<list_quads<cell_list>>{{list, quads_}, &state_->cells}, stream);
@@ -134,8 +150,12 @@ public:
                                &state_->quads},
             stream);
     }
+    [[nodiscard]] core::passes::bounded_surface* state() const { return state_; }
+    [[nodiscard]] const surface_limits& room() const { return room_; }
     [[nodiscard]] surface_result result(const grid& samples) const {
-        return {samples, left_vertices(), triangles_, options_.quads ? left_quads() : nullptr, &state_->counts};
+        return {samples,         left_vertices(),
+                triangles_,      options_.quads ? left_quads() : nullptr,
+                &state_->counts, leaves_out() ? left_sources_ : sources_};
     }
 
 private:
@@ -175,7 +195,8 @@ private:
             sum(counts_, places_, room_.vertices + 1, stream);
             sum(kept_quads_, quad_places_, room_.quads + 1, stream);
             run(room_.vertices,
-                bounded<move_vertices>{{counts_, places_, vertices_, nullptr, left_vertices_, nullptr}, vertices},
+                bounded<move_vertices>{{counts_, places_, vertices_, sources_, left_vertices_, left_sources_},
+                                       vertices},
                 stream);
             run(room_.quads, bounded<move_quads>{{kept_quads_, quad_places_, places_, quads_, left_quads_}, quads},
                 stream);
@@ -192,7 +213,7 @@ private:
     core::passes::bounded_surface* state_ = nullptr;
     core::cell_sheets* table_ = nullptr;
     std::uint32_t *words_ = nullptr, *first_of_word_ = nullptr, *counts_ = nullptr, *edges_ = nullptr,
-                  *parents_ = nullptr, *kept_quads_ = nullptr;
+                  *parents_ = nullptr, *kept_quads_ = nullptr, *sources_ = nullptr, *left_sources_ = nullptr;
     std::uint64_t *first_of_row_ = nullptr, *keys_ = nullptr, *first_vertices_ = nullptr, *first_edges_ = nullptr,
                   *sizes_ = nullptr, *places_ = nullptr, *quad_places_ = nullptr;
     std::uint16_t* states_ = nullptr;
@@ -215,6 +236,21 @@ private:
     for (const std::uint64_t n : {room.cells, room.vertices, room.quads, rows})
         if (n >= core::max_numbered) return core::failure(status_code::size_overflow);
     return {};
+}
+
+// What a call has found; see read_surface_status.
+[[nodiscard]] inline status surface_status(const core::passes::bounded_surface& state, const surface_limits& room,
+                                           surface_limits* need) {
+    if (state.all_cells > room.cells || state.all_vertices > room.vertices || state.all_quads > room.quads) {
+        if (need != nullptr)
+            *need = {std::max(room.cells, state.all_cells),
+                     std::max({room.vertices, state.all_vertices, state.all_cells}),
+                     std::max({room.quads, state.all_quads, state.all_cells})};
+        return core::failure(status_code::capacity_exceeded, stage::vertex_shade);
+    }
+    status s;
+    s.surface = state.counts;
+    return s;
 }
 
 } // namespace device
@@ -268,17 +304,7 @@ template <class T, class Blend, class Layout>
                                                 surface_limits* need = nullptr) {
     core::passes::bounded_surface state{};
     if (const status s = device::read_start(workspace.memory, state, backend.stream); !s.ok()) return s;
-    const surface_limits& room = workspace.limits;
-    if (state.all_cells > room.cells || state.all_vertices > room.vertices || state.all_quads > room.quads) {
-        if (need != nullptr)
-            *need = {std::max(room.cells, state.all_cells),
-                     std::max({room.vertices, state.all_vertices, state.all_cells}),
-                     std::max({room.quads, state.all_quads, state.all_cells})};
-        return core::failure(status_code::capacity_exceeded, stage::vertex_shade);
-    }
-    status s;
-    s.surface = state.counts;
-    return s;
+    return device::surface_status(state, workspace.limits, need);
 }
 
 } // namespace voxelpipe

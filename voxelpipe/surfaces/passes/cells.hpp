@@ -84,6 +84,16 @@ struct cell_rows {
     }
 };
 
+// The layers of samples, or of cells, whose counts are wanted: a slab shares some with its neighbours.
+struct counted_layers {
+    int first = 0, end = 0x7fffffff;
+    [[nodiscard]] VOXELPIPE_HD bool has(int z) const { return z >= first && z < end; }
+    // The cells whose lowest samples lie in these layers. The cells below the grid belong to its lowest layer.
+    [[nodiscard]] counted_layers cells() const {
+        return {first == 0 ? 0 : first + 1, end == 0x7fffffff ? end : end + 1};
+    }
+};
+
 // All cells of a grid of samples, in rows along x of 32 cells a word.
 struct cell_grid {
     sample_bits samples;

@@ -33,7 +33,8 @@ struct cross_mesh {
     bool each_draw; // inside of any draw
     int fraction;
     edge_crossing* crossings;
-    std::uint64_t* counts; // by edge_count
+    std::uint64_t* counts;       // by edge_count
+    counted_layers counted = {}; // of cells
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         const auto cell = static_cast<std::uint32_t>(i);
@@ -41,7 +42,7 @@ struct cross_mesh {
         if (!is_crossed(corners, 4 * Axis)) return;
         const cell_key at{cells.keys[cell]};
         const std::int64_t p[3] = {at.x() - 1, at.y() - 1, at.z() - 1};
-        crossings[cells.edge(cell, Axis)] = find(p, (corners & 1) != 0);
+        crossings[cells.edge(cell, Axis)] = find(p, (corners & 1) != 0, counted.has(at.z()));
     }
 
 private:
@@ -63,7 +64,7 @@ private:
     [[nodiscard]] VOXELPIPE_HD std::uint64_t begin_of(std::uint64_t row) const {
         return first_of_row != nullptr ? first_of_row[row] : count_below(keys, count, row << rows.bits);
     }
-    [[nodiscard]] VOXELPIPE_HD edge_crossing find(const std::int64_t (&p)[3], bool goes_out) const {
+    [[nodiscard]] VOXELPIPE_HD edge_crossing find(const std::int64_t (&p)[3], bool goes_out, bool is_counted) const {
         constexpr int u = row_keys<Axis>::u, v = row_keys<Axis>::v;
         const std::uint64_t row = rows.row(p[u], p[v]), low = begin_of(row), length = begin_of(row + 1) - low;
         // The first sample beyond these crossings is the edge's upper one.
@@ -74,7 +75,7 @@ private:
 
         place chosen{};
         if (!choose(s, sample, chosen)) {
-            add_shared(counts[static_cast<int>(edge_count::made)], 1);
+            if (is_counted) add_shared(counts[static_cast<int>(edge_count::made)], 1);
             return {};
         }
         const exact_normal n = normal(chosen.triangle);
@@ -83,7 +84,7 @@ private:
         set_normal(c, n, Axis, goes_out);
         if (mesh.drawn > chosen.triangle)
             c.triangle = chosen.triangle;
-        else
+        else if (is_counted)
             add_shared(counts[static_cast<int>(edge_count::on_cones)], 1);
         return c;
     }

@@ -20,6 +20,7 @@ struct read_samples {
     double level;
     std::uint32_t* words;
     std::uint64_t* nan_samples; // a count
+    counted_layers counted = {};
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         const auto row_words = static_cast<std::uint64_t>((from.extent.x + 31) / 32);
@@ -41,7 +42,7 @@ struct read_samples {
             word |= inside ? 1u << bit : 0u;
         }
         words[i] = word;
-        if (nans != 0) add_shared(*nan_samples, nans);
+        if (nans != 0 && counted.has(z)) add_shared(*nan_samples, nans);
     }
 };
 
@@ -53,7 +54,8 @@ struct cross_field {
     View from;
     double level;
     edge_crossing* crossings;
-    std::uint64_t* made; // a count
+    std::uint64_t* made;         // a count
+    counted_layers counted = {}; // of cells
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         const auto cell = static_cast<std::uint32_t>(i);
@@ -73,7 +75,7 @@ struct cross_field {
             }
             if (t >= 0.0 && t <= 1.0)
                 c.t = static_cast<std::uint32_t>(exact::round_to_int64(exact::mul(t, 1 << edge_crossing::fraction)));
-            else
+            else if (counted.has(at.z()))
                 add_shared(*made, 1);
             crossings[next++] = c;
         }

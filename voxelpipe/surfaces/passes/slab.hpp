@@ -31,16 +31,20 @@ struct find_layers {
     }
 };
 
-// The vertices from `first` on, in the cells of the whole.
-struct move_slab_vertices {
-    const surface_vertex* from;
+// The items from `first` on.
+template <class T>
+struct copy_part {
+    const T* from;
     std::uint64_t first;
+    T* to;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const { to[i] = from[first + i]; }
+};
+
+// Vertices in the cells of the whole.
+struct raise_vertices {
+    surface_vertex* vertices;
     int layers_below;
-    surface_vertex* to;
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        to[i] = from[first + i];
-        to[i].cell.z += layers_below;
-    }
+    VOXELPIPE_HD void operator()(std::uint64_t i) const { vertices[i].cell.z += layers_below; }
 };
 
 // Indices of the whole. `shift` may stand for a number below 0, modulo 2^32.
