@@ -229,8 +229,7 @@ TEST(StreamedDistances, AreThoseOfTheModelThatIsHeld) {
     two_ways{folder, folder / "m.ply", {"-r", "60", "--padding", "4", "--distance"}}.expect_equal(60, {});
     two_ways{folder,
              folder / "m.ply",
-             {"-r", "40", "--distance", "--unsigned", "--band", "1.5", "-t",
-              "distance,nearest,color,normal,material,triangle,depth"}}
+             {"-r", "40", "--distance", "--unsigned", "--band", "1.5", "-t", "nearest,color,normal,depth"}}
         .expect_equal(60, {});
     write_ball(folder / "m.ply", 16);
     // The model leaves the grid: slabs without triangles, and rows that only triangles beside the grid cross.
