@@ -237,7 +237,7 @@ TEST(StreamedDistances, AreThoseOfTheModelThatIsHeld) {
         two_ways{folder,
                  folder / "m.ply",
                  {"--voxel-size", "0.02", "--origin", "0.3,0.1,-0.4", "--extent", "30,50,70", "--distance", repair}}
-            .expect_equal(60, {});
+            .expect_equal(75, {});
     const two_ways open{folder, folder / "m.ply", {"-r", "40", "--distance", "--solid", "positive"}};
     open.expect_equal(60, {});
     EXPECT_NE(std::string::npos, open.draw_streamed(60).err.find("the sign of --distance: the model is not closed"));
