@@ -123,7 +123,7 @@ public:
                     options.bodies == bodies::call ? 1 : std::uint64_t{draws.size()}};
         num_keys_ = static_cast<uint128>(rows_) * keys_of_.bodies * keys_of_.slots;
         if (!fits()) return;
-        const std::uint64_t sorted = std::max(room, num_edges());
+        const std::uint64_t sorted = std::max({room, num_named(), num_edges()});
         state_ = memory.take<cell_state>(1);
         positions_ = memory.take<core::snapped_position>(vertices_ + 1);
         indices_ = memory.take<glm::uvec3>(triangles_);
@@ -138,9 +138,11 @@ public:
             order_[i] = memory.take<std::uint32_t>(sorted);
         }
         sort_bytes_ =
-            std::max(sort_bytes_of(room, key_bits()), sort_bytes_of(num_edges(), core::passes::edge_key_bits));
+            std::max({sort_bytes_of(room, key_bits()), sort_bytes_of(num_named(), core::passes::place_key_bits),
+                      sort_bytes_of(num_edges(), 2 * name_bits())});
         sort_ = memory.take<std::uint8_t>(sort_bytes_);
         terms_ = memory.take<terms_type>(room);
+        names_ = memory.take<std::uint32_t>(num_named() + 1); // one, of vertex 0, for bad indices
         cursors_ = keys_of_.bodies == 1 ? nullptr : memory.take<cursor>(rows_ * keys_of_.bodies);
     }
     [[nodiscard]] bool fits() const {
@@ -178,11 +180,7 @@ public:
         sum_counts(num_terms_, first_term_, static_cast<std::uint32_t>(triangles_ + 1), scan_, scan_bytes_,
                    stage::coarse_raster, stream);
         run(1, bound_cell_records{first_term_ + triangles_, room_, state_}, stream);
-        if (options_.count_open_edges) {
-            run(num_edges(), hash_edges{mesh, keys_[0], order_[0]}, stream);
-            const int at = sort(num_edges(), edge_key_bits, stream);
-            run(num_edges(), count_open_edges{mesh, keys_[at], order_[at], num_edges(), counts}, stream);
-        }
+        if (options_.count_open_edges) find_open_edges(stream);
         run(room_, fill_cell_keys{&state_->records, static_cast<std::uint64_t>(num_keys_), keys_[0], order_[0]},
             stream);
         const core::passes::list_cells<terms_type> list{
@@ -204,6 +202,20 @@ private:
         std::uint64_t vertex, triangle;
     };
     [[nodiscard]] std::uint64_t num_edges() const { return options_.count_open_edges ? 3 * triangles_ : 0; }
+    // Vertices whose places get names, and the bits of a name.
+    [[nodiscard]] std::uint64_t num_named() const { return options_.count_open_edges ? vertices_ : 0; }
+    [[nodiscard]] int name_bits() const { return static_cast<int>(std::bit_width(vertices_)); }
+    // As core::cell_scene::count_open_edges, in the arrays that the records are sorted in later.
+    void find_open_edges(cudaStream_t stream) const {
+        using namespace core::passes;
+        const std::uint64_t edges = num_edges();
+        run(vertices_, hash_places{positions_, keys_[0], order_[0]}, stream);
+        int at = sort(vertices_, place_key_bits, stream);
+        run(vertices_, name_places{positions_, keys_[at], order_[at], vertices_, names_}, stream);
+        run(edges, key_edges{indices_, names_, name_bits(), keys_[0], order_[0]}, stream);
+        at = sort(edges, 2 * name_bits(), stream);
+        run(edges, count_unmatched_edges{keys_[at], order_[at], edges, name_bits(), state_->counts}, stream);
+    }
     [[nodiscard]] int key_bits() const {
         return static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys_)));
     }
@@ -248,6 +260,7 @@ private:
     cell_shader* shaders_ = nullptr;
     std::uint32_t* num_terms_ = nullptr;
     unsigned long long* first_term_ = nullptr;
+    std::uint32_t* names_ = nullptr; // of the vertices' places
     std::uint8_t *scan_ = nullptr, *sort_ = nullptr;
     std::size_t scan_bytes_ = 0, sort_bytes_ = 0;
     std::uint64_t* keys_[2] = {nullptr, nullptr};
