@@ -274,6 +274,14 @@ inline constexpr bool has_collect = requires(Backend& b) {
     b.template collect<int>(std::uint64_t{0}, [](std::uint64_t, const auto&) {});
 };
 
+// Calls pass(i) for rows below a number. A backend may have another way along rows: an overload for it.
+namespace passes {
+template <class Backend, class Pass>
+void for_each_row(const Backend& backend, std::uint64_t num_rows, const Pass& pass) {
+    backend.for_each(num_rows, pass);
+}
+} // namespace passes
+
 // The terms of a call's triangles by row and voxel, and what shades them.
 template <class Backend, class CellShader>
 class listed_cells {
@@ -320,9 +328,9 @@ public:
     }
     // Looks at the sums of the rows of the grid, or of `count` listed ones.
     [[nodiscard]] status measure(std::uint64_t count, const std::uint64_t* rows = nullptr) {
-        backend_.for_each(count * keys_of_.bodies,
-                          passes::measure_rows<terms_type>{terms(), checks_size(), counts(), rows,
-                                                           sizes_.size() == 0 ? nullptr : sizes_.data()});
+        for_each_row(backend_, count * keys_of_.bodies,
+                     passes::measure_rows<terms_type>{terms(), checks_size(), counts(), rows,
+                                                      sizes_.size() == 0 ? nullptr : sizes_.data()});
         return result();
     }
     // What goes along rows, of which there are `places` at a time.
@@ -432,8 +440,8 @@ template <class Backend, class Mesh, class VertexShader, class CellShader, class
     if (const status s = cells.list(); !s.ok()) return s;
     if (const status s = cells.measure(cells.num_rows()); !s.ok()) return s;
     if (const status begun = begin_fold(backend, fb); !begun.ok()) return begun;
-    backend.for_each(cells.num_rows(),
-                     passes::shade_cells<CellShader, Targets...>{cells.walk(cells.num_rows()), fb, cells.counts()});
+    for_each_row(backend, cells.num_rows(),
+                 passes::shade_cells<CellShader, Targets...>{cells.walk(cells.num_rows()), fb, cells.counts()});
     return cells.result();
 }
 
