@@ -326,59 +326,107 @@ VOXELPIPE_HD void visit_only_cell(const cell_triangle<Int>& t, const cell_box& b
     visit(std::int64_t{0}, std::int64_t{0}, is_before ? box.lo[0] - 1 : is_behind ? box.hi[0] : 0, terms);
 }
 
+// The layers of pixels with one z that a triangle meets within a box, and the pixels' y.
+struct cell_pixels {
+    std::int64_t z_first, z_end, y_first, y_end;
+};
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD cell_pixels pixels_of(const cell_triangle<Int>& t, const cell_box& box) {
+    const auto later = [](std::int64_t p, std::int64_t q) { return p > q ? p : q; };
+    const auto earlier = [](std::int64_t p, std::int64_t q) { return p < q ? p : q; };
+    return {later(box.lo[2], 0), earlier(box.hi[2], t.reach[2]), later(box.lo[1], 0), earlier(box.hi[1], t.reach[1])};
+}
+// At least the number of pixels that for_each_cell_of_layer looks at in any layer: of a triangle that is cut to layers,
+// its widest section, as far as its edges go beside it within a layer, and those at the ends.
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD std::int64_t most_pixels_of_layer(const cell_triangle<Int>& t, const cell_pixels& all) {
+    const std::int64_t most = all.y_end - all.y_first;
+    if (t.reach[2] < 2 || most < 4) return most;
+    const double voxel = voxels_in_unit(t);
+    double beside = 0.0, height = 0.0;
+    for (int e = 0; e < 3; ++e) {
+        const auto &p = t.p[e], &q = t.p[e == 2 ? 0 : e + 1];
+        const double y = exact::to_double(q[1] > p[1] ? q[1] - p[1] : p[1] - q[1]) * voxel,
+                     z = exact::to_double(q[2] > p[2] ? q[2] - p[2] : p[2] - q[2]) * voxel;
+        beside += z > 1.0 ? y / z : y;
+        height = z > height ? z : height;
+    }
+    const double area = exact::to_double(t.n[0] < 0 ? -t.n[0] : t.n[0]) * voxel * voxel; // twice the projection's
+    const double pixels = area / height + beside + 3.0; // a layer is cut: the height is not 0
+    return pixels < exact::to_double(most) ? static_cast<std::int64_t>(pixels) : most;
+}
+
+// Calls visit(y, z, i, terms), as for_each_cell_of_pixel, for the voxels of a layer: of all its pixels, or of the one
+// with this number (one: 0 to most_pixels_of_layer - 1), which there may not be. whole: with its three corners.
+VOXELPIPE_ANY_CALLABLE
+template <bool OnlyCount, class Terms, class Int, class Visit>
+VOXELPIPE_HD void for_each_cell_of_layer(const cell_triangle<Int>& t, const cut_polygon& whole, cutting_planes& planes,
+                                         cut_corners<Int>& corners, const cell_box& box, const area_ratio& areas,
+                                         const cell_pixels& all, std::int64_t k, std::int64_t one, Visit&& visit) {
+    cut_polygon layer = whole;
+    corners.count = 3;
+    std::int64_t j_first = all.y_first, j_end = all.y_end;
+    planes.at[4] = k << t.fraction;
+    planes.at[5] = (k + 1) << t.fraction;
+    if (t.reach[2] > 1) {
+        if (k > 0) cut(t, planes, 4, false, corners, layer);
+        if (k + 1 < t.reach[2]) cut(t, planes, 5, true, corners, layer);
+        if (layer.count == 0) return;
+        if (t.reach[1] > 2) { // the pixels between the layer's ends, and one beyond where these are close to a side
+            double lo = 0.0, hi = 0.0;
+            for (int i = 0; i < layer.count; ++i) {
+                const double y = corner_value(t, corners.at[layer.corner[i]], 1, 0);
+                lo = i == 0 || y < lo ? y : lo;
+                hi = i == 0 || y > hi ? y : hi;
+            }
+            const auto first = static_cast<std::int64_t>(lo - 0x1p-10),
+                       end = static_cast<std::int64_t>(hi + 0x1p-10) + 1;
+            j_first = first > j_first ? first : j_first;
+            j_end = end < j_end ? end : j_end;
+        }
+    }
+    if (one >= 0) {
+        j_first += one;
+        j_end = j_first + 1 < j_end ? j_first + 1 : j_end;
+    }
+    const int num_corners = corners.count;
+    for (std::int64_t j = j_first; j < j_end; ++j) {
+        cut_polygon column = layer;
+        corners.count = num_corners;
+        planes.at[2] = j << t.fraction;
+        planes.at[3] = (j + 1) << t.fraction;
+        if (t.reach[1] > 1) {
+            if (j > 0) cut(t, planes, 2, false, corners, column);
+            if (j + 1 < t.reach[1]) cut(t, planes, 3, true, corners, column);
+        }
+        if (t.reach[1] > 1 || t.reach[2] > 1)
+            if (!meets_inside(t, planes, corners, column)) continue;
+        for_each_cell_of_pixel<OnlyCount, Terms>(t, column, planes, corners, box, areas, j, k, visit);
+    }
+}
+
+// True if a triangle lies within one voxel.
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD bool is_in_one_cell(const cell_triangle<Int>& t) {
+    return t.reach[0] == 1 && t.reach[1] == 1 && t.reach[2] == 1;
+}
+
 // Calls visit(y, z, i, terms) for all voxels in which a part of a triangle lies, as for_each_cell_of_pixel. areas: what
 // area_terms need.
 VOXELPIPE_ANY_CALLABLE
 template <bool OnlyCount, class Terms = cell_terms, class Int, class Visit>
 VOXELPIPE_HD void for_each_cell(const cell_triangle<Int>& t, const cell_box& box, Visit&& visit,
                                 const area_ratio& areas = {0, 0.0}) {
-    if (t.reach[0] == 1 && t.reach[1] == 1 && t.reach[2] == 1) {
+    if (is_in_one_cell(t)) {
         visit_only_cell<OnlyCount, Terms>(t, box, areas, visit);
         return;
     }
     cutting_planes planes{};
     cut_corners<Int> corners;
     const cut_polygon whole = whole_triangle(t, corners);
-    const std::int64_t z_first = box.lo[2] > 0 ? box.lo[2] : 0, z_end = box.hi[2] < t.reach[2] ? box.hi[2] : t.reach[2];
-    const std::int64_t y_first = box.lo[1] > 0 ? box.lo[1] : 0, y_end = box.hi[1] < t.reach[1] ? box.hi[1] : t.reach[1];
-    for (std::int64_t k = z_first; k < z_end; ++k) {
-        cut_polygon layer = whole;
-        corners.count = 3;
-        std::int64_t j_first = y_first, j_end = y_end;
-        planes.at[4] = k << t.fraction;
-        planes.at[5] = (k + 1) << t.fraction;
-        if (t.reach[2] > 1) {
-            if (k > 0) cut(t, planes, 4, false, corners, layer);
-            if (k + 1 < t.reach[2]) cut(t, planes, 5, true, corners, layer);
-            if (layer.count == 0) continue;
-            if (t.reach[1] > 2) { // the pixels between the layer's ends, and one beyond where these are close to a side
-                double lo = 0.0, hi = 0.0;
-                for (int i = 0; i < layer.count; ++i) {
-                    const double y = corner_value(t, corners.at[layer.corner[i]], 1, 0);
-                    lo = i == 0 || y < lo ? y : lo;
-                    hi = i == 0 || y > hi ? y : hi;
-                }
-                const auto first = static_cast<std::int64_t>(lo - 0x1p-10),
-                           end = static_cast<std::int64_t>(hi + 0x1p-10) + 1;
-                j_first = first > j_first ? first : j_first;
-                j_end = end < j_end ? end : j_end;
-            }
-        }
-        const int num_corners = corners.count;
-        for (std::int64_t j = j_first; j < j_end; ++j) {
-            cut_polygon column = layer;
-            corners.count = num_corners;
-            planes.at[2] = j << t.fraction;
-            planes.at[3] = (j + 1) << t.fraction;
-            if (t.reach[1] > 1) {
-                if (j > 0) cut(t, planes, 2, false, corners, column);
-                if (j + 1 < t.reach[1]) cut(t, planes, 3, true, corners, column);
-            }
-            if (t.reach[1] > 1 || t.reach[2] > 1)
-                if (!meets_inside(t, planes, corners, column)) continue;
-            for_each_cell_of_pixel<OnlyCount, Terms>(t, column, planes, corners, box, areas, j, k, visit);
-        }
-    }
+    const cell_pixels all = pixels_of(t, box);
+    for (std::int64_t k = all.z_first; k < all.z_end; ++k)
+        for_each_cell_of_layer<OnlyCount, Terms>(t, whole, planes, corners, box, areas, all, k, -1, visit);
 }
 
 } // namespace voxelpipe::core

@@ -274,6 +274,19 @@ inline constexpr bool has_collect = requires(Backend& b) {
     b.template collect<int>(std::uint64_t{0}, [](std::uint64_t, const auto&) {});
 };
 
+// A backend that lists terms in its own way: list_terms_by_pixel(backend, scene's mesh, keys, counts, room) in
+// passes, where room is a term_room.
+template <class Backend>
+inline constexpr bool lists_by_pixel = false;
+
+// The arrays of a call's terms, which are as long as they have to be, or longer.
+template <class Backend, class Terms>
+struct term_room {
+    typename Backend::template buffer<std::uint64_t>& keys;
+    typename Backend::template buffer<std::uint32_t>& order;
+    typename Backend::template buffer<Terms>& terms;
+};
+
 // Calls pass(i) for rows below a number. A backend may have another way along rows: an overload for it.
 namespace passes {
 template <class Backend, class Pass>
@@ -323,7 +336,11 @@ public:
 
         if (finds_edges) scene_.count_open_edges();
         if (!list_terms(triangles)) return fail(status_code::out_of_memory);
-        backend_.sort_by_key(keys_, order_, static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys))));
+        const int bits = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys)));
+        if constexpr (lists_by_pixel<Backend>)
+            backend_.sort_by_key(keys_, order_, bits, num_records_);
+        else
+            backend_.sort_by_key(keys_, order_, bits);
         return {};
     }
     // Looks at the sums of the rows of the grid, or of `count` listed ones.
@@ -354,7 +371,8 @@ public:
     }
     [[nodiscard]] std::uint64_t* counts() { return scene_.counts(); }
     [[nodiscard]] passes::record_list<terms_type> terms() {
-        return {keys_of_, keys_.data(), order_.data(), terms_.data(), terms_.size()};
+        return {keys_of_, keys_.data(), order_.data(), terms_.data(),
+                lists_by_pixel<Backend> ? num_records_ : terms_.size()};
     }
     [[nodiscard]] status fail(status_code code) const {
         status s = failure(code, stage::coarse_raster);
@@ -377,6 +395,10 @@ private:
             backend_.take(std::move(records),
                           passes::store_record<terms_type>{keys_.data(), order_.data(),
                                                            checks_size() ? sizes_.data() : nullptr, terms_.data()});
+        } else if constexpr (lists_by_pixel<Backend>) {
+            num_records_ = list_terms_by_pixel(backend_, scene_.mesh(), keys_of_, scene_.counts(),
+                                               term_room<Backend, terms_type>{keys_, order_, terms_});
+            return num_records_ < most;
         } else {
             buffer<std::uint64_t> first_term(backend_, triangles + 1);
             std::uint64_t count = 0;
