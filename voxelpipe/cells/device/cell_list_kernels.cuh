@@ -68,37 +68,21 @@ struct count_cell_pixels {
 
 inline constexpr unsigned cell_list_threads = 128;
 
-// Stores the terms of pixels with numbers below num_pixels, as long as there is room, and counts all.
+// Stores the terms of all pixels, as long as there is room, and counts all.
 template <class Terms>
 struct list_cell_pixels {
     core::passes::cell_mesh mesh;
     core::passes::cell_keys keys_of;
-    const std::uint64_t* first_pixel; // of each triangle
-    std::uint64_t num_pixels;
+    const std::uint64_t* first_pixel; // of each triangle, and the end
     cell_list_state* state;
     std::uint64_t room;
     std::uint64_t* keys;
     std::uint32_t* order;
     Terms* terms;
 };
+// Those of one pixel of a triangle, by its number.
 template <class Int, class Terms>
-__global__ __launch_bounds__(cell_list_threads) void list_cell_pixels_kernel(
-    const __grid_constant__ list_cell_pixels<Terms> pass) {
-    __shared__ std::uint32_t owners[2]; // the triangles of the block's first and last pixel
-    await_stream();
-    if (std::is_same_v<Int, int128> && pass.state->has_wide == 0) return;
-    const std::uint64_t first = std::uint64_t{blockIdx.x} * cell_list_threads, item = first + threadIdx.x;
-    if (threadIdx.x < 2) {
-        const std::uint64_t last = first + cell_list_threads - 1, end = pass.num_pixels - 1;
-        owners[threadIdx.x] = core::find_owner(pass.first_pixel, pass.mesh.num_triangles,
-                                               threadIdx.x == 0 ? first
-                                               : last < end     ? last
-                                                                : end);
-    }
-    __syncthreads();
-    if (item >= pass.num_pixels) return;
-    const std::uint32_t i = owners[0] + core::find_owner(pass.first_pixel + owners[0], owners[1] - owners[0] + 1, item);
-    const auto number = static_cast<std::int64_t>(item - pass.first_pixel[i]);
+__device__ void list_cell_pixel(const list_cell_pixels<Terms>& pass, std::uint32_t i, std::int64_t number) {
     with_cell_triangle<Terms, Int>(pass.mesh, i, [&](const core::cell_triangle<Int>& t, const core::cell_box& box) {
         core::area_ratio areas{0, 0.0};
         if constexpr (core::has_areas<Terms>) areas = core::ratio_of(t, pass.mesh.areas);
@@ -125,6 +109,32 @@ __global__ __launch_bounds__(cell_list_threads) void list_cell_pixels_kernel(
         core::for_each_cell_of_layer<false, Terms>(t, whole, planes, corners, box, areas, all, all.z_first + k,
                                                    number - k * width, store);
     });
+}
+// error: null, or a word that is not 0 where the call has failed; nothing is done then.
+template <class Int, class Terms>
+__global__
+__launch_bounds__(cell_list_threads) void list_cell_pixels_kernel(const __grid_constant__ list_cell_pixels<Terms> pass,
+                                                                  const unsigned* error) {
+    __shared__ std::uint32_t owners[2]; // the triangles of the block's first and last pixel
+    await_stream();
+    if ((error != nullptr && *error != 0) || (std::is_same_v<Int, int128> && pass.state->has_wide == 0)) return;
+    const std::uint64_t num_pixels = pass.first_pixel[pass.mesh.num_triangles];
+    for (std::uint64_t first = std::uint64_t{blockIdx.x} * cell_list_threads; first < num_pixels;
+         first += std::uint64_t{gridDim.x} * cell_list_threads) {
+        if (threadIdx.x < 2) {
+            const std::uint64_t last = first + cell_list_threads - 1, at = threadIdx.x == 0 ? first : last;
+            owners[threadIdx.x] =
+                core::find_owner(pass.first_pixel, pass.mesh.num_triangles, at < num_pixels ? at : num_pixels - 1);
+        }
+        __syncthreads();
+        const std::uint64_t pixel = first + threadIdx.x;
+        if (pixel < num_pixels) {
+            const std::uint32_t i =
+                owners[0] + core::find_owner(pass.first_pixel + owners[0], owners[1] - owners[0] + 1, pixel);
+            list_cell_pixel<Int>(pass, i, static_cast<std::int64_t>(pixel - pass.first_pixel[i]));
+        }
+        __syncthreads(); // the owners are read
+    }
 }
 
 } // namespace voxelpipe::device

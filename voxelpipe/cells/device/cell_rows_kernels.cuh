@@ -164,18 +164,26 @@ public:
         const auto& list = walk_.list;
         const std::uint64_t first_key = row * list.keys_of.slots + 1 + static_cast<std::uint64_t>(first);
         const std::uint64_t end_key = first_key + static_cast<std::uint64_t>(min(32, walk_.row_extent - first));
-        const bool has_any = find_starts(first_key, end_key, carry.at);
+        const unsigned found = find_starts(first_key, end_key, carry.at);
+        const bool has_any = (found >> lane() & 1u) != 0;
         cursor own{has_any ? starts_[lane()] : 0, first_key + lane(), 0, 0, 0};
         typename cursor::slot_sums sums{};
         if (has_any) sums = own.take(list);
-        const std::uint64_t before = static_cast<std::uint64_t>(carry.aperture) + sum_of_lower_lanes(sums.cover);
+        auto before = static_cast<std::uint64_t>(carry.aperture);
         if constexpr (core::has_moments<terms_type>) {
-            sums.moments.y += carry.y + sum_of_lower_lanes(own.y);
-            sums.moments.z += carry.z + sum_of_lower_lanes(own.z);
-            carry.y += warp_sum(own.y);
-            carry.z += warp_sum(own.z);
+            sums.moments.y += carry.y;
+            sums.moments.z += carry.z;
         }
-        add(carry.aperture, warp_sum(sums.cover));
+        if (found != 0) {
+            before += sum_of_lower_lanes(sums.cover);
+            add(carry.aperture, warp_sum(sums.cover));
+            if constexpr (core::has_moments<terms_type>) {
+                sums.moments.y += sum_of_lower_lanes(own.y);
+                sums.moments.z += sum_of_lower_lanes(own.z);
+                carry.y += warp_sum(own.y);
+                carry.z += warp_sum(own.z);
+            }
+        }
         if (place.x < walk_.row_extent)
             walk_.shade_body(body, place, place.x + 1, sums, static_cast<std::int64_t>(before), own.at, is_drawn, tally,
                              visit);
@@ -188,9 +196,10 @@ private:
         to = static_cast<std::int64_t>(static_cast<std::uint64_t>(to) + n);
     }
 
-    // Puts the first terms of the voxels with keys from first_key up to end_key into `starts`; true if this lane's has
-    // any. at: the first term that may be of them; becomes the first behind them.
-    [[nodiscard]] __device__ bool find_starts(std::uint64_t first_key, std::uint64_t end_key, std::uint64_t& at) const {
+    // Puts the first terms of the voxels with keys from first_key up to end_key into `starts`; returns which have any.
+    // at: the first term that may be of them; becomes the first behind them.
+    [[nodiscard]] __device__ unsigned find_starts(std::uint64_t first_key, std::uint64_t end_key,
+                                                  std::uint64_t& at) const {
         const auto& list = walk_.list;
         unsigned found = 0; // voxels with terms
         std::uint64_t last = ~std::uint64_t{0};
@@ -209,7 +218,7 @@ private:
             if (lanes != whole_warp) break;
         }
         __syncwarp();
-        return (found >> lane() & 1u) != 0;
+        return found;
     }
 
     const walk_type& walk_;

@@ -12,6 +12,7 @@
 #include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/device/scene/subset.cuh>
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 
@@ -32,15 +33,15 @@ void shade_cell_rows(const core::passes::shade_cells<CellShader, Targets...>& pa
                   stream, stage::fine_raster, pass, num_rows, error);
 }
 
-// Stores the terms of all pixels.
+// Stores the terms of all pixels, of which there are about so many. error: as above.
 template <class Terms>
-void list_cells(const list_cell_pixels<Terms>& pass, cudaStream_t stream) {
-    if (pass.num_pixels == 0) return;
-    const auto blocks = static_cast<unsigned>((pass.num_pixels - 1) / cell_list_threads + 1);
+void list_cells(const list_cell_pixels<Terms>& pass, std::uint64_t num_pixels, const unsigned* error,
+                cudaStream_t stream) {
+    const auto blocks = static_cast<unsigned>(std::min<std::uint64_t>(num_pixels / cell_list_threads + 1, 1u << 20));
     launch_behind(list_cell_pixels_kernel<std::int64_t, Terms>, blocks, cell_list_threads, stream, stage::coarse_raster,
-                  pass);
-    launch_behind(list_cell_pixels_kernel<int128, Terms>, blocks, cell_list_threads, stream, stage::coarse_raster,
-                  pass);
+                  pass, error);
+    launch_behind(list_cell_pixels_kernel<int128, Terms>, blocks, cell_list_threads, stream, stage::coarse_raster, pass,
+                  error);
 }
 
 } // namespace voxelpipe::device
@@ -84,10 +85,9 @@ template <class Terms>
         room.order = cuda_backend::buffer<std::uint32_t>(backend, terms);
         room.terms = cuda_backend::buffer<Terms>(backend, terms);
         device::with_runtime_errors([&] {
-            device::list_cells(device::list_cell_pixels<Terms>{mesh, keys_of, first_pixel.data(), pixels, state.data(),
-                                                               terms, room.keys.data(), room.order.data(),
-                                                               room.terms.data()},
-                               backend.stream);
+            device::list_cells(device::list_cell_pixels<Terms>{mesh, keys_of, first_pixel.data(), state.data(), terms,
+                                                               room.keys.data(), room.order.data(), room.terms.data()},
+                               pixels, nullptr, backend.stream);
         });
         const std::uint64_t found = state.to_host(backend)[0].num_terms;
         if (found <= terms || found >= most) return found < most ? found : most;
