@@ -5,6 +5,7 @@
 // voxelize_cells on any backend: list the terms of all triangles, sort them by row and voxel, sum and shade the rows.
 
 #include <voxelpipe/cells/passes/cell_walk.hpp>
+#include <voxelpipe/core/row_passes.hpp>
 #include <voxelpipe/programs/passes/fragment_pool.hpp>
 #include <voxelpipe/solid/core/holes.hpp>
 #include <voxelpipe/surfaces/passes/mesh_rows.hpp>
@@ -286,14 +287,6 @@ struct term_room {
     typename Backend::template buffer<std::uint32_t>& order;
     typename Backend::template buffer<Terms>& terms;
 };
-
-// Calls pass(i) for rows below a number. A backend may have another way along rows: an overload for it.
-namespace passes {
-template <class Backend, class Pass>
-void for_each_row(const Backend& backend, std::uint64_t num_rows, const Pass& pass) {
-    backend.for_each(num_rows, pass);
-}
-} // namespace passes
 
 // The terms of a call's triangles by row and voxel, and what shades them.
 template <class Backend, class CellShader>
