@@ -33,7 +33,7 @@ void shade_cell_rows(const core::passes::shade_cells<CellShader, Targets...>& pa
                   stream, stage::fine_raster, pass, num_rows, error);
 }
 
-// Stores the terms of all pixels, of which there are about so many. error: as above.
+// Stores the terms of all pixels. num_pixels: about how many there are; error: as above.
 template <class Terms>
 void list_cells(const list_cell_pixels<Terms>& pass, std::uint64_t num_pixels, const unsigned* error,
                 cudaStream_t stream) {

@@ -275,8 +275,8 @@ inline constexpr bool has_collect = requires(Backend& b) {
     b.template collect<int>(std::uint64_t{0}, [](std::uint64_t, const auto&) {});
 };
 
-// A backend that lists terms in its own way: list_terms_by_pixel(backend, scene's mesh, keys, counts, room) in
-// passes, where room is a term_room.
+// True of a backend that lists terms in its own way, by passes::list_terms_by_pixel(backend, mesh of the scene, keys,
+// counts, term_room).
 template <class Backend>
 inline constexpr bool lists_by_pixel = false;
 

@@ -78,7 +78,7 @@ public:
     void sort_by_key(buffer<std::uint64_t>& keys, buffer<std::uint32_t>& values, int bits) {
         sort_by_key(keys, values, bits, keys.size());
     }
-    // The same for the first n pairs, which alone are kept.
+    // Sorts the first n pairs, which alone are kept.
     template <int = 0>
     void sort_by_key(buffer<std::uint64_t>& keys, buffer<std::uint32_t>& values, int bits, std::size_t n) {
         if (n < 2) return;
