@@ -68,26 +68,32 @@ public:
     template <class Make>
     collected_items(unsigned num_threads, std::uint64_t count, const Make& make)
         : parts_((core::length_of(count) + block - 1) / block), first_(parts_.size() + 1), added_(parts_.size()) {
-        parallel_for(num_threads, parts_.size(), [&](unsigned, std::size_t b) {
+        struct memory {
             std::vector<Item> part;
-            part.reserve(2 * block);
-            std::vector<std::uint32_t> remembered(merges ? num_remembered : 0);
-            const std::uint64_t last = std::min<std::uint64_t>(count, (b + 1) * block);
-            std::uint64_t& added = added_[b];
-            const auto add = [&](const Item& item) {
+            std::vector<std::uint32_t> remembered;
+        };
+        std::vector<memory> of_worker(std::max(num_threads, 1u));
+        parallel_for(num_threads, parts_.size(), [&](unsigned worker, std::size_t b) {
+            auto& [part, remembered] = of_worker[worker];
+            if (merges && remembered.empty()) remembered.resize(num_remembered);
+            part.clear();
+            std::uint64_t added = 0;
+            const auto add = [&, &items = part, &places = remembered](const Item& item) {
                 ++added;
                 if constexpr (merges) {
-                    std::uint32_t& at = remembered[item.key * 0x9e3779b97f4a7c15u >> (64 - log2_remembered)];
-                    if (at < part.size() && part[at].key == item.key) {
-                        part[at].merge(item);
+                    std::uint32_t& at = places[item.key * 0x9e3779b97f4a7c15u >> (64 - log2_remembered)];
+                    if (at < items.size() && items[at].key == item.key) {
+                        items[at].merge(item);
                         return;
                     }
-                    at = static_cast<std::uint32_t>(part.size());
+                    at = static_cast<std::uint32_t>(items.size());
                 }
-                part.push_back(item);
+                items.push_back(item);
             };
+            const std::uint64_t last = std::min<std::uint64_t>(count, (b + 1) * block);
             for (std::uint64_t i = b * block; i < last; ++i) make(i, add);
-            parts_[b] = std::move(part);
+            parts_[b] = std::vector<Item>(part); // no larger than it has to be
+            added_[b] = added;
         });
         for (std::size_t b = 0; b < parts_.size(); ++b) first_[b + 1] = first_[b] + parts_[b].size();
     }

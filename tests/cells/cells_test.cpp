@@ -406,6 +406,11 @@ TEST(Cells, BadInput) {
     EXPECT_EQ(bad.code, vp::status_code::index_out_of_range);
     EXPECT_EQ(bad.triangle, m.triangles.size() - 1);
     EXPECT_EQ(vp::get<0>(fb).to_host(backend), before); // nothing is written
+    mesh no_vertices;
+    no_vertices.triangles = {{0, 1, 2}};
+    for (const vp::repair r : {vp::repair::none, vp::repair::close_holes})
+        EXPECT_EQ(draw(no_vertices, {.repair = r}).code, vp::status_code::index_out_of_range);
+    EXPECT_EQ(vp::get<0>(fb).to_host(backend), before);
     EXPECT_TRUE(draw({}, {}).ok());
     const std::vector<float> cleared = vp::get<0>(fb).to_host(backend);
     EXPECT_TRUE(std::all_of(cleared.begin(), cleared.end(), [](float f) { return f == 0.0f; }));

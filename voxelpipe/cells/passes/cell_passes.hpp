@@ -312,6 +312,7 @@ public:
 
     // Closes holes, then lists and sorts. Throws what the backend's buffers throw.
     [[nodiscard]] status list() {
+        if (scene_.num_vertices() == 0) return result(); // bad indices, of which none is a vertex's
         if (options_.repair == repair::close_holes) {
             if (options_.cones != nullptr)
                 scene_.close_holes(options_.cones, options_.bodies == bodies::call ? 1 : num_draws_, holes_);

@@ -78,13 +78,14 @@ VOXELPIPE_ANY_CALLABLE
 template <class Terms, class Emit>
 VOXELPIPE_HD triangle_class emit_cells(const cell_mesh& mesh, const cell_keys& keys_of, std::uint64_t i, Emit&& emit) {
     const std::uint64_t body = keys_of.bodies == 1 ? 0 : mesh.draw_of(i);
-    return visit_cells<false, Terms>(mesh, i,
-                                     [&](std::uint64_t y, std::uint64_t z, std::uint64_t slot, const Terms& of_voxel) {
-                                         Terms terms = of_voxel;
-                                         if constexpr (has_sheets<Terms>)
-                                             terms.triangle = static_cast<std::uint32_t>(i);
-                                         emit(keys_of.key(y, z, body, slot), terms);
-                                     });
+    VOXELPIPE_CALLS_ANY
+    const auto visit = [&](std::uint64_t y, std::uint64_t z, std::uint64_t slot, const Terms& of_voxel) {
+        Terms terms = of_voxel;
+        if constexpr (has_sheets<Terms>) terms.triangle = static_cast<std::uint32_t>(i);
+        emit(keys_of.key(y, z, body, slot), terms);
+    };
+    VOXELPIPE_CALLS_ANY_END
+    return visit_cells<false, Terms>(mesh, i, visit);
 }
 
 // Stores the terms of counted triangles.
