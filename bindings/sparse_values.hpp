@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Shared by the bindings of all languages: attributes that are baked into sparse framebuffers, which gives the values of
-// the voxels that have a fragment in the Morton order of the voxels, the same for every attribute of a mesh.
+// Shared by the bindings of all languages: attributes that are baked into sparse framebuffers, which gives the values
+// of the voxels that have a fragment in the Morton order of the voxels, the same for every attribute of a mesh.
 
 #include <bindings/bits.hpp>
 #include <bindings/value_rows.hpp>
@@ -87,7 +87,8 @@ struct sparse_values {
     status result;
 };
 
-// Draws on any backend. Sums are divided on the host by call.threads threads: a device's quotient of NaN has other bits.
+// Draws on any backend. Sums are divided on the host by call.threads threads: a device's quotient of NaN has other
+// bits.
 template <class T, int Components, class Blend, class Backend>
 [[nodiscard]] sparse_values<T> draw_sparse_values(Backend& backend, const bake_call<T>& call, bool is_mean,
                                                   bool with_voxels) {
