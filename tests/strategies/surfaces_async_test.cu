@@ -185,11 +185,10 @@ TEST(DeviceSurfacesAsync, OfFieldsHaveTheBytesOfExtract) {
 }
 
 TEST(DeviceSurfacesAsync, GraphsFollowTheSamples) {
-    vp::cuda_backend gpu;
     cudaStream_t stream = nullptr;
     ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
-    gpu.stream = stream;
     {
+        vp::cuda_backend gpu{stream}; // frees its memory on the stream
         const glm::ivec3 extent(20, 11, 9);
         std::mt19937 random(3);
         std::vector<float> values(20 * 11 * 9);
@@ -255,11 +254,10 @@ TEST(DeviceRemeshAsync, HasTheBytesOfRemesh) {
 }
 
 TEST(DeviceRemeshAsync, GraphsFollowTheVertices) {
-    vp::cuda_backend gpu;
     cudaStream_t stream = nullptr;
     ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
-    gpu.stream = stream;
     {
+        vp::cuda_backend gpu{stream}; // frees its memory on the stream
         const vp::grid g = grid_around_models(glm::ivec3(14, 13, 12));
         const host_mesh m = ball(glm::vec3(0.5f), 0.35f, 1);
         vp::cuda_backend::buffer<glm::vec3> positions(gpu, vp::array_view<const glm::vec3>(m.positions));
