@@ -4,12 +4,17 @@
 """Meshes that voxelpipe and other packages make of three small inputs: boundary edges, bad edges, components, intersections and time.
 
     bench/python/surfaces.py [--out FILE] [--resolution 64] [--seconds 1]
+    bench/python/surfaces.py --models 1000 [--every] [--first 0] [--out FILE]
 
 The inputs are made here: two boxes that cross each other; a ball of which a twentieth of the triangles is gone; and a soup of a ball, a
 plate and a shell with triangles flipped, doubled and gone. A boundary edge has one face; a bad edge has more than two, or two that go
 around it alike; meshes are judged as they are indexed. Components share vertices. Intersecting faces are those that PyMeshLab selects.
 Each time is the least of at least three calls after a first one, or that of one that takes longer than --seconds. A package that is not installed is left out,
 and one that refuses an input says so. The table is Markdown, with all versions.
+
+With --models, voxelpipe alone remeshes that many generated bad models by nine signs, and trimesh and manifold3d, which both have to be
+installed, judge every mesh as it is indexed: watertight, wound consistently, of a volume above 0, and a manifold. Each model is taken by
+every sign at one place on one grid, or with --every at all three places on grids of 32 and 64. Ends with 1 where one mesh fails.
 """
 import argparse
 import os
@@ -179,6 +184,119 @@ PROGRAMS = [  # name, package, function
 ]
 
 
+SIGNS = [
+    {},
+    {"sign": "even_odd"},
+    {"sign": "positive"},
+    {"repair": "close_holes"},
+    {"repair": "exterior"},
+    {"repair": "exterior", "closing": 1},
+    {"repair": "vote"},
+    {"repair": "winding"},
+    {"level": 0.04},
+]
+PLACES = ("corner", "mean", "sharp")
+
+
+def bad_model(seed):
+    """Crossing parts, shells, plates, some of no thickness; triangles gone, flipped, doubled, cut beside an edge; slivers; NaN; far corners."""
+    rng = np.random.default_rng([61, seed])
+    ball = sphere(levels=2)
+    octahedron = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1.0]])
+    eight = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])
+    parts = []
+    for _ in range(rng.integers(1, 5)):
+        c, r = rng.uniform(0.3, 0.7, 3), rng.uniform(0.1, 0.3)
+        kind = rng.integers(5)
+        if kind == 0:
+            parts.append((c + r * ball[0], ball[1]))
+        elif kind == 1:
+            parts.append((c + r * octahedron, eight))
+        elif kind == 2:
+            parts.append((c - [r, r, 0] + BOX * [2 * r, 2 * r, rng.choice([0.0, 0.02])], SIDES))
+        elif kind == 3:
+            parts += [(c + r * ball[0], ball[1]), (c + 0.7 * r * ball[0], ball[1])]
+        else:
+            parts.append((c - r + BOX * [2 * r, 1.5 * r, 2 * r], SIDES))
+    v, f = joined(*parts)
+    f = np.delete(f, rng.choice(len(f), min(len(f) - 4, int(rng.integers(20))), replace=False), axis=0)
+    faults = rng.random(6) < 0.5
+    if faults[0]:
+        turned = rng.integers(len(f), size=5)
+        f[turned] = f[turned][:, ::-1]
+    if faults[1]:
+        f = np.concatenate([f, f[rng.integers(len(f), size=5)]])
+    if faults[2]:
+        for k in rng.choice(len(f), 4, replace=False):
+            a, b, c = f[k]
+            v = np.concatenate([v, [(v[a] + v[b]) / 2 + [0, 0, 0.003]]])
+            f[k] = [a, len(v) - 1, c]
+            f = np.concatenate([f, [[len(v) - 1, b, c]]])
+    if faults[3]:
+        for _ in range(6):
+            p, q = rng.uniform(0.1, 0.9, (2, 3))
+            f = np.concatenate([f, [[len(v), len(v) + 1, len(v) + 2]]])
+            v = np.concatenate([v, [p, q, q + [0, 0, 1e-4]]])
+    if faults[4]:
+        v[rng.integers(len(v)), 1] = np.nan
+    if faults[5]:
+        v[rng.integers(len(v))] = [1e6, -1e9, 3]
+    return v, f
+
+
+def faults_of(vertices, faces):
+    """What trimesh and manifold3d say against a mesh."""
+    import manifold3d
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    boundary, bad, _ = judged(faces)
+    solid = manifold3d.Manifold(manifold3d.Mesh64(np.asarray(vertices, np.float64), np.asarray(faces, np.uint64)))
+    said = {
+        "boundary edges": boundary != 0,
+        "bad edges": bad != 0,
+        "trimesh: not watertight": not mesh.is_watertight,
+        "trimesh: wound inconsistently": not mesh.is_winding_consistent,
+        "trimesh: no volume": not mesh.volume > 0,
+        "manifold3d: no manifold": solid.status() != manifold3d.Error.NoError,
+    }
+    return [what for what, is_so in said.items() if is_so]
+
+
+def judge_models(args):
+    import warnings
+
+    warnings.simplefilter("ignore")
+    box = (np.array([[0.0, 0, 0], [1, 1, 1]]), np.array([[0, 1, 1]]))
+    grids = {n: vp.fit(box, n) for n in (32, 64)}
+    meshes = faces_in_all = empty = 0
+    counts, said = {}, []
+    start = time.perf_counter()
+    for seed in range(args.first, args.first + args.models):
+        model = bad_model(seed)
+        for way, options in enumerate(SIGNS):
+            for p, place in enumerate(PLACES):
+                for n, grid in grids.items():
+                    if not args.every and (p != (seed + way) % 3 or (n == 64) != (seed % 8 == 0)):
+                        continue
+                    vertices, faces, _ = vp.remesh(model, grid, place=place, status=counts, **options)
+                    if len(faces) == 0:
+                        empty += 1
+                        continue
+                    meshes += 1
+                    faces_in_all += len(faces)
+                    said += [(what, seed, options, place, n) for what in faults_of(vertices, faces)]
+    names = ("voxelpipe", "numpy", "trimesh", "manifold3d")
+    text = f"{args.models} bad models from {args.first} on, {meshes} meshes of {faces_in_all} triangles, {empty} empty ones; {len(said)} faults"
+    text += f"; {time.perf_counter() - start:.0f} s; Python {platform.python_version()}, " + ", ".join(f"{p} {version(p)}" for p in names) + "\n"
+    for what, seed, options, place, n in said:
+        text += f"{what}: model {seed}, {options}, {place}, grid of {n}\n"
+    print(text, end="")
+    if args.out:
+        args.out.write_text(text, encoding="utf-8")
+    return 1 if said or meshes == 0 else 0
+
+
 def timed(call, seconds):
     time.sleep(0.5)  # threads of the package before may still turn
     call()
@@ -197,7 +315,12 @@ def main():
     parser.add_argument("--out", type=pathlib.Path)
     parser.add_argument("--resolution", type=int, default=64)
     parser.add_argument("--seconds", type=float, default=1)
+    parser.add_argument("--models", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--every", action="store_true")
     args = parser.parse_args()
+    if args.models:
+        return judge_models(args)
     import warnings
 
     warnings.simplefilter("ignore")
@@ -220,7 +343,8 @@ def main():
             print(lines[-1], flush=True)
     if args.out:
         args.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -26,13 +26,20 @@ namespace voxelpipe::cpu {
     return {static_cast<double>(p.x) * scale.x, static_cast<double>(p.y) * scale.y, static_cast<double>(p.z) * scale.z};
 }
 
-// The nearest triangle of any point.
+// The nearest triangle of any point. hint: one that may be near, on which the result does not depend;
+// nearest_triangle{}.primitive: none is known.
 [[nodiscard]] inline nearest_triangle find_nearest(const geometry& s, const triangle_tree& tree, const vector3& scale,
                                                    const core::distance_scale& world, double largest,
-                                                   const core::snapped_position& p) {
+                                                   const core::snapped_position& p, std::uint32_t hint) {
     nearest_triangle best;
     float bound = std::numeric_limits<float>::infinity();
     const vector3 at = place(p, scale);
+    const auto take = [&](std::uint32_t primitive) {
+        const snapped_triangle u = find_triangle(s, primitive);
+        best.take(core::find_distance(core::see_wide(u.a, u.b, u.c, p), world).square, primitive);
+        bound = static_cast<float>(std::sqrt(best.square) / largest) * (1.0f + 0x1p-20f);
+    };
+    if (hint != nearest_triangle{}.primitive) take(hint);
     tree.visit(
         at, [&] { return bound; },
         [&](std::size_t first, std::size_t last) {
@@ -47,9 +54,7 @@ namespace voxelpipe::cpu {
                 const double most =
                     double{bound} * (1.0 + 0x1p-20) + 0x1p-40 * (std::abs(at.x) + std::abs(at.y) + std::abs(at.z));
                 if (x * x + y * y + z * z > most * most) continue;
-                const snapped_triangle u = find_triangle(s, t.primitive);
-                best.take(core::find_distance(core::see_wide(u.a, u.b, u.c, p), world).square, t.primitive);
-                bound = static_cast<float>(std::sqrt(best.square) / largest) * (1.0f + 0x1p-20f);
+                if (t.primitive != best.primitive) take(t.primitive);
             }
         });
     return best;
@@ -125,6 +130,7 @@ template <class Mesh, class VertexShader, class Shader>
         std::vector<std::uint64_t> bad(blocks);
         cpu::parallel_for(how.threads, blocks, [&](unsigned, std::size_t b) {
             std::vector<std::int64_t> windings(num_bodies);
+            cpu::nearest_triangle n; // of the point before, which is near, as a rule
             for (std::size_t i = b * block; i < std::min(points.size(), (b + 1) * block); ++i) {
                 const glm::vec3 point = points[i];
                 const snapped_position p = snap(call.shapes.snap, point.x, point.y, point.z);
@@ -133,8 +139,7 @@ template <class Mesh, class VertexShader, class Shader>
                 if (!is_drawable(p)) {
                     ++bad[b];
                 } else {
-                    const cpu::nearest_triangle n =
-                        cpu::find_nearest(call.shapes, *call.tree, scale, call.scene.scale, largest, p);
+                    n = cpu::find_nearest(call.shapes, *call.tree, scale, call.scene.scale, largest, p, n.primitive);
                     distance = distance_of(n.square);
                     if (!call.tree->empty())
                         nearest = call.shapes.numbers_of(call.shapes.find(n.primitive), n.primitive).primitive;

@@ -1,14 +1,17 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The table of cells against a walk along directed segments, written from the definition alone.
+// The table of cells against a walk along directed segments, written from the definition alone; and every neighbourhood
+// of two cells, of an edge and of a sample. VOXELPIPE_TEST_SCALE (environment variable) from 20 on takes all of these.
 #include "surface_support.hpp"
 
 #include <cpu_ref/backend.hpp>
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <map>
 #include <set>
 #include <utility>
@@ -182,6 +185,113 @@ TEST(SurfaceCells, AllPairsOfNeighboursAreClosedManifolds) {
         EXPECT_TRUE(extract_bits(backend, v).is_closed_manifold()) << axis;
         EXPECT_TRUE(extract_bits(backend, v, {.quads = true}).is_closed_manifold()) << axis;
     }
+}
+
+// Small patterns of 3 x 3 x 3 samples or fewer, two samples apart from each other, up to 16^3 or 32^3 at once.
+class pattern_judge {
+public:
+    pattern_judge(vp::cpu_backend& backend, int side) : backend_(backend), side_(side), volume_(glm::ivec3(5 * side)) {}
+
+    // Bit i: sample i % 3, i / 3 % 3, i / 9.
+    void add(std::uint32_t pattern) {
+        const int x = 5 * (count_ % side_), y = 5 * (count_ / side_ % side_), z = 5 * (count_ / (side_ * side_));
+        for (int i = 0; i < 27; ++i)
+            if ((pattern >> i & 1) != 0) volume_.set(x + i % 3, y + i / 3 % 3, z + i / 9);
+        if (++count_ == side_ * side_ * side_) judge_all();
+    }
+    // To be called last.
+    void judge_all() {
+        EXPECT_TRUE(extract_bits(backend_, volume_, {.quads = true}).is_closed_manifold());
+        judged += static_cast<std::uint64_t>(count_);
+        volume_ = bit_volume(volume_.extent);
+        count_ = 0;
+    }
+
+    std::uint64_t judged = 0;
+
+private:
+    vp::cpu_backend& backend_;
+    int side_, count_ = 0;
+    bit_volume volume_;
+};
+
+bool takes_all_patterns() {
+    const char* const scale = std::getenv("VOXELPIPE_TEST_SCALE");
+    return scale != nullptr && std::atoi(scale) >= 20;
+}
+
+// Two layers of 3 x 3 samples along each axis, around the edge in their middle.
+TEST(SurfaceCells, AllNeighbourhoodsOfAnEdgeAreClosedManifolds) {
+    vp::cpu_backend backend{2};
+    const bool is_whole = takes_all_patterns();
+    const std::uint32_t step = is_whole ? 1 : 61;
+    for (int axis = 0; axis < 3; ++axis) {
+        pattern_judge patterns(backend, is_whole ? 32 : 16);
+        for (std::uint32_t layers = 0; layers < 1u << 18; layers += step) {
+            std::uint32_t pattern = 0;
+            for (int bit = 0; bit < 18; ++bit) {
+                std::array<int, 3> p{};
+                p[static_cast<std::size_t>(axis)] = bit / 9;
+                p[axis == 0 ? 1 : 0] = bit % 3;
+                p[axis == 2 ? 1 : 2] = bit / 3 % 3;
+                pattern |= (layers >> bit & 1) << (p[0] + 3 * p[1] + 9 * p[2]);
+            }
+            patterns.add(pattern);
+        }
+        patterns.judge_all();
+        EXPECT_EQ(patterns.judged, ((1u << 18) + step - 1) / step);
+    }
+}
+
+// All 2^27: of those that turns and mirrors of the cube make the same, the least one. Their number is that of
+// Burnside's lemma.
+TEST(SurfaceCells, NeighbourhoodsOfASampleAreClosedManifolds) {
+    vp::cpu_backend backend{2};
+    if (!takes_all_patterns()) {
+        pattern_judge patterns(backend, 16);
+        std::mt19937 random(27);
+        for (int i = 0; i < 4000; ++i) patterns.add(random() & ((1u << 27) - 1));
+        patterns.judge_all();
+        return;
+    }
+    // Where each third of a pattern's bits goes.
+    std::vector<std::array<std::array<std::uint32_t, 512>, 3>> turns;
+    std::array<std::size_t, 3> axes{0, 1, 2};
+    std::uint64_t fixed = 0;
+    do
+        for (int mirrors = 0; mirrors < 8; ++mirrors) {
+            std::array<int, 27> to{};
+            for (int i = 0; i < 27; ++i) {
+                const std::array<int, 3> p{i % 3, i / 3 % 3, i / 9};
+                std::array<int, 3> q{};
+                for (std::size_t a = 0; a < 3; ++a) q[axes[a]] = (mirrors >> a & 1) != 0 ? 2 - p[a] : p[a];
+                to[static_cast<std::size_t>(i)] = q[0] + 3 * q[1] + 9 * q[2];
+            }
+            auto& turn = turns.emplace_back();
+            for (std::size_t third = 0; third < 3; ++third)
+                for (std::uint32_t bits = 0; bits < 512; ++bits)
+                    for (std::size_t b = 0; b < 9; ++b)
+                        if ((bits >> b & 1) != 0) turn[third][bits] |= 1u << to[9 * third + b];
+            std::array<bool, 27> seen{};
+            int cycles = 0;
+            for (std::size_t i = 0; i < 27; ++i) {
+                if (seen[i]) continue;
+                ++cycles;
+                for (std::size_t k = i; !seen[k]; k = static_cast<std::size_t>(to[k])) seen[k] = true;
+            }
+            fixed += std::uint64_t{1} << cycles;
+        }
+    while (std::next_permutation(axes.begin(), axes.end()));
+    ASSERT_EQ(turns.size(), 48u);
+    pattern_judge patterns(backend, 32);
+    for (std::uint32_t pattern = 0; pattern < 1u << 27; ++pattern) {
+        const bool is_least = std::all_of(turns.begin(), turns.end(), [&](const auto& t) {
+            return (t[0][pattern & 511] | t[1][pattern >> 9 & 511] | t[2][pattern >> 18]) >= pattern;
+        });
+        if (is_least) patterns.add(pattern);
+    }
+    patterns.judge_all();
+    EXPECT_EQ(patterns.judged, fixed / 48);
 }
 
 // The judge itself: what it has to refuse.

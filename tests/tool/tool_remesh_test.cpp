@@ -401,6 +401,59 @@ TEST(Remeshing, LargeGridsTakeMemoryByTheSurface) {
     EXPECT_NE(std::string::npos, refused.err.find("MiB are needed")) << refused.err;
 }
 
+// The bytes of a run that holds the mesh, and its counts and warnings.
+TEST(Remeshing, MeshesThatDoNotFitAreMadeInSlabs) {
+    if (sanitized) return; // which takes memory of its own
+    const scratch_folder folder;
+    write_painted_ball(folder / "m.glb");
+    surface_tests::host_mesh open = surface_tests::ball(glm::vec3(0.5F), 0.4F, 4);
+    open.add(surface_tests::box(glm::vec3(0.1F), glm::vec3(0.7F, 0.3F, 0.9F)));
+    open.triangles.erase(open.triangles.begin() + 100);
+    write_obj(folder / "open.obj", open);
+    struct way {
+        std::string model, output;
+        std::vector<std::string> more;
+    };
+    for (const way& w :
+         {way{"m.glb", "glb", {"-r", "300"}}, way{"m.glb", "3mf", {"-r", "240"}},
+          way{"m.glb", "npz", {"-r", "300", "--quads"}}, way{"open.obj", "obj", {"-r", "280", "--place", "mean"}},
+          way{"open.obj", "stl", {"-r", "300", "--close-holes", "--place", "corner"}},
+          way{"open.obj", "ply", {"-r", "200", "--iso", "0.01", "--padding", "4"}}}) {
+        const auto make = [&](const std::string& name, const std::vector<std::string>& limit) {
+            std::vector<std::string> all{folder / w.model, "--remesh", "--stats", "json",
+                                         "--compression",  "0",        "-o",      folder / name + "." + w.output};
+            all.insert(all.end(), w.more.begin(), w.more.end());
+            all.insert(all.end(), limit.begin(), limit.end());
+            return run(folder, all);
+        };
+        const outcome whole = make("whole", {});
+        ASSERT_EQ(0, whole.code) << whole.err;
+        const json a = json::parse(whole.out);
+        const std::uint64_t limit = a["peak_memory_bytes"].get<std::uint64_t>() * 2 / 3 >> 20;
+        const outcome tight = make("tight", {"--max-memory", std::to_string(limit)});
+        ASSERT_EQ(0, tight.code) << w.output << ": " << tight.err;
+        const json b = json::parse(tight.out);
+        EXPECT_LE(b["peak_memory_bytes"], limit << 20) << w.output;
+        EXPECT_EQ(1, a["slabs"]);
+        EXPECT_GT(b["slabs"], 1) << w.output;
+        EXPECT_EQ(a["remesh"], b["remesh"]) << w.output;
+        EXPECT_EQ(a["warnings"], b["warnings"]) << w.output;
+        EXPECT_TRUE(read_file(folder / "whole." + w.output) == read_file(folder / "tight." + w.output)) << w.output;
+        for (const char* name : {"whole.", "tight."}) fs::remove(folder / name + w.output);
+    }
+    // What looks at the whole grid is not.
+    const outcome refused = run(folder, {folder / "m.glb", "--remesh", "-r", "300", "--embedded", "--max-memory", "40",
+                                         "-o", folder / "o.ply"});
+    EXPECT_EQ(3, refused.code) << refused.err;
+    EXPECT_NE(std::string::npos, refused.err.find("MiB are needed")) << refused.err;
+    int files = 0; // no temporary ones
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder.path())) {
+        ++files;
+        EXPECT_TRUE(entry.path().filename() == "m.glb" || entry.path().filename() == "open.obj") << entry.path();
+    }
+    EXPECT_EQ(2, files);
+}
+
 TEST(Remeshing, LevelsGrowTheModel) {
     const scratch_folder folder;
     write_crossing_boxes(folder / "m.glb");

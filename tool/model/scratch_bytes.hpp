@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A temporary file that is first written, then read as the parts of a model are.
+// A temporary file that is first written, then read as the parts of a model or of a mesh are.
 
 #include <voxelpipe/slabs/bins.hpp>
 
@@ -17,20 +17,23 @@ namespace voxelize {
 // write_error.
 class scratch_bytes {
 public:
-    // A new, empty file in FOLDER.
-    explicit scratch_bytes(std::filesystem::path folder);
+    // A new, empty file in FOLDER, for WHAT, which messages name.
+    explicit scratch_bytes(std::filesystem::path folder, const char* what = "the model");
 
     void append(std::span<const std::byte> bytes);
-    // Bytes that were appended.
+    // Bytes that were appended. Once all are, and flush() was called, any threads may read.
     void read(std::uint64_t offset, std::span<char> bytes);
+    // Other bytes in the place of some that were appended. Nobody reads meanwhile.
+    void replace(std::uint64_t offset, std::span<const std::byte> bytes);
+    void flush();
 
 private:
-    void flush();
     // Does work(), whose std::system_error becomes a write_error.
     template <class Work>
     auto named(const Work& work) const;
 
     std::filesystem::path folder_;
+    const char* what_;
     voxelpipe::slabs::scratch_file file_;
     std::vector<std::byte> pending_;
 };

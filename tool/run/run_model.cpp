@@ -190,7 +190,8 @@ void run_slabs(const command_line& options, slab_source&& source, const bounding
 void run_remesh(const command_line& options, scene&& model, const bounding_box& bounds, progress_bar& bar,
                 run_report& report) {
     bar.start("remeshing");
-    const surface_mesh mesh = run_remesher(std::move(model), report.request, report.stats);
+    const surface_mesh mesh =
+        run_remesher(std::move(model), report.request, folder_of(options.outputs.front()), report.stats);
     report.surface = surface_result{mesh.counts, mesh.euler()};
     report.warnings.insert(report.warnings.end(), report.stats.warnings.begin(), report.stats.warnings.end());
     warn_of_dropped(report);

@@ -20,7 +20,9 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
+#include <vector>
 
 namespace voxelize {
 namespace {
@@ -186,55 +188,87 @@ private:
 
     // Ways of vertices that share their place with another one of their cell, towards the mean of their faces'
     // vertices.
-    [[nodiscard]] std::vector<std::array<double, 3>> insets() const {
-        const auto& v = mesh_.vertices;
-        const auto is_shared = [&](std::size_t n) {
-            const auto same = [&](std::size_t other) {
-                return v[other].cell == v[n].cell && std::equal(v[n].q, v[n].q + 3, v[other].q);
-            };
-            for (std::size_t other = n; other-- > 0 && v[other].cell == v[n].cell;)
-                if (same(other)) return true;
-            for (std::size_t other = n + 1; other < v.size() && v[other].cell == v[n].cell; ++other)
-                if (same(other)) return true;
-            return false;
+    [[nodiscard]] std::unordered_map<std::uint32_t, std::array<double, 3>> insets() const {
+        struct sum {
+            std::array<double, 3> way{};
+            std::uint32_t count = 0;
         };
-        std::vector<char> shared(v.size());
-        for (std::size_t n = 0; n < v.size(); ++n) shared[n] = is_shared(n) ? 1 : 0;
-        std::vector<std::array<double, 3>> ways(v.size());
-        std::vector<std::uint32_t> counts(v.size());
+        std::unordered_map<std::uint32_t, sum> sums;
+        const auto& v = mesh_.vertices;
+        for (std::size_t first = 0, end = 0; first < v.size(); first = end) {
+            std::vector<voxelpipe::surface_vertex> cell{v[first]};
+            for (end = first + 1; end < v.size() && v[end].cell == cell[0].cell; ++end) cell.push_back(v[end]);
+            for (std::size_t i = 0; i < cell.size(); ++i)
+                for (std::size_t k = 0; k < cell.size(); ++k)
+                    if (i != k && std::equal(cell[i].q, cell[i].q + 3, cell[k].q))
+                        sums.try_emplace(static_cast<std::uint32_t>(first + i));
+        }
+        if (sums.empty()) return {};
         for (std::size_t f = 0; f < faces(); ++f) {
             const index_list all = face(f);
             for (std::size_t i = 0; i < corners(); ++i) {
-                const std::uint32_t n = all[i];
-                if (shared[n] == 0) continue;
-                for (std::size_t k = 0; k < corners(); ++k)
+                const auto found = sums.find(all[i]);
+                if (found == sums.end()) continue;
+                const voxelpipe::surface_vertex from = v[all[i]];
+                for (std::size_t k = 0; k < corners(); ++k) {
+                    const voxelpipe::surface_vertex to = v[all[k]];
                     for (std::size_t a = 0; a < 3; ++a)
-                        ways[n][a] += place(v[all[k]], a, v[all[k]].q[a]) - place(v[n], a, v[n].q[a]);
-                counts[n] += static_cast<std::uint32_t>(corners());
+                        found->second.way[a] += place(to, a, to.q[a]) - place(from, a, from.q[a]);
+                }
+                found->second.count += static_cast<std::uint32_t>(corners());
             }
         }
-        for (std::size_t n = 0; n < v.size(); ++n)
-            for (double& way : ways[n]) way = counts[n] != 0 ? way / counts[n] / 64 : 0;
+        std::unordered_map<std::uint32_t, std::array<double, 3>> ways;
+        for (auto& [n, s] : sums) {
+            for (double& way : s.way) way = way / s.count / 64;
+            ways.emplace(n, s.way);
+        }
         return ways;
+    }
+
+    // True if two vertices have the same floats. Vertices come by layers, whose floats ascend along z.
+    template <class Coordinate>
+    [[nodiscard]] bool merge_as_floats(const Coordinate& coordinate) const {
+        std::vector<std::array<float, 3>> floats; // of layers that share floats along z
+        float highest = -std::numeric_limits<float>::infinity();
+        const auto has_same = [&floats] {
+            std::sort(floats.begin(), floats.end());
+            return std::adjacent_find(floats.begin(), floats.end()) != floats.end();
+        };
+        for (std::size_t n = 0; n < mesh_.vertices.size();) {
+            const int layer = mesh_.vertices[n].cell.z;
+            const std::size_t before = floats.size();
+            float lowest = std::numeric_limits<float>::infinity();
+            for (; n < mesh_.vertices.size() && mesh_.vertices[n].cell.z == layer; ++n) {
+                floats.push_back({static_cast<float>(coordinate(n, 0)), static_cast<float>(coordinate(n, 1)),
+                                  static_cast<float>(coordinate(n, 2))});
+                lowest = std::min(lowest, floats.back()[2]);
+            }
+            if (lowest > highest) { // nothing of the layers before is met again
+                std::vector<std::array<float, 3>> next(floats.begin() + static_cast<std::ptrdiff_t>(before),
+                                                       floats.end());
+                floats.resize(before);
+                if (has_same()) return true;
+                floats = std::move(next);
+            }
+            for (const std::array<float, 3>& p : floats) highest = std::max(highest, p[2]);
+        }
+        return has_same();
     }
 
     void write_stl(output_file& out) {
         if (triangles() > max_stl_triangles)
             throw write_error(path_, "a .stl counts its triangles with 32 bits; .ply and .npz hold more");
         const int bits = float_bits();
-        const std::vector<std::array<double, 3>> ways = insets();
+        const std::unordered_map<std::uint32_t, std::array<double, 3>> ways = insets();
         const auto coordinate = [&](std::size_t n, std::size_t a) {
-            return std::fma(rounded(n, a, bits) + ways[n][a], mesh_.voxel_size[a], mesh_.origin[a]);
+            const auto way = ways.find(static_cast<std::uint32_t>(n));
+            const double at = rounded(n, a, bits) + (way != ways.end() ? way->second[a] : 0.0);
+            return std::fma(at, mesh_.voxel_size[a], mesh_.origin[a]);
         };
-        if (options_.warn) {
-            std::vector<std::array<float, 3>> floats(mesh_.vertices.size());
-            for (std::size_t n = 0; n < floats.size(); ++n)
-                for (std::size_t a = 0; a < 3; ++a) floats[n][a] = static_cast<float>(coordinate(n, a));
-            std::sort(floats.begin(), floats.end());
-            if (std::adjacent_find(floats.begin(), floats.end()) != floats.end())
-                options_.warn(path_.string() + ": the floats of .stl merge vertices of this mesh, which is far from 0 "
-                                               "for its voxel size; .glb, .ply and .obj keep them apart");
-        }
+        if (options_.warn && merge_as_floats(coordinate))
+            options_.warn(path_.string() + ": the floats of .stl merge vertices of this mesh, which is far from 0 "
+                                           "for its voxel size; .glb, .ply and .obj keep them apart");
         write_stl_triangles(out, triangles(), options_.threads, meter_, [&](std::size_t n) {
             stl_triangle t{};
             const auto index = triangle(n);
@@ -261,9 +295,18 @@ private:
             const auto say = [&](std::string_view text) { add(std::as_bytes(std::span{text})); };
             std::vector<std::uint32_t> palette;
             if (has_colors()) {
-                for (std::size_t n = 0; n < mesh_.vertices.size(); ++n) palette.push_back(encoded_number(n));
-                std::sort(palette.begin(), palette.end());
-                palette.erase(std::unique(palette.begin(), palette.end()), palette.end());
+                const auto sort = [&palette] {
+                    std::sort(palette.begin(), palette.end());
+                    palette.erase(std::unique(palette.begin(), palette.end()), palette.end());
+                };
+                std::size_t room = std::size_t{1} << 16; // a mesh has fewer colours than vertices
+                for (std::size_t n = 0; n < mesh_.vertices.size(); ++n) {
+                    palette.push_back(encoded_number(n));
+                    if (palette.size() < room) continue;
+                    sort();
+                    room = std::max(room, 2 * palette.size());
+                }
+                sort();
                 say("<m:colorgroup id=\"2\">\n");
                 in_pieces(palette.size(), [&](std::string& text, std::size_t n) { add_3mf_color(text, palette[n]); });
                 say("</m:colorgroup>\n");

@@ -11,6 +11,7 @@
 #include "draw/voxelizer.hpp"
 #include "model/surface_mesh.hpp"
 
+#include <voxelpipe/surfaces/remesh_slab.hpp>
 #include <voxelpipe/surfaces/remesh_sparse.hpp>
 
 #include <algorithm>
@@ -18,8 +19,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <new>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -99,7 +102,8 @@ inline void fill_normals(surface_mesh& mesh) {
         vector e{};
         for (int a = 0; a < 3; ++a) {
             const auto units = [&](std::uint32_t v) {
-                return 65536.0 * mesh.vertices[v].cell[a] + mesh.vertices[v].q[a];
+                const vp::surface_vertex at = mesh.vertices[v];
+                return 65536.0 * at.cell[a] + at.q[a];
             };
             e[a] = vp::exact::mul(units(to) - units(from), mesh.voxel_size[static_cast<std::size_t>(a)]);
         }
@@ -112,73 +116,210 @@ inline void fill_normals(surface_mesh& mesh) {
             if (const auto sum = sums.find(v); sum != sums.end())
                 for (int k = 0; k < 3; ++k) sum->second[k] += normal[k];
     };
-    for (const glm::uvec3& t : mesh.triangles) add(t.x, t.y, t.z);
-    for (const glm::uvec4& q : mesh.quads) {
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        const glm::uvec3 t = mesh.triangles[i];
+        add(t.x, t.y, t.z);
+    }
+    for (std::size_t i = 0; i < mesh.quads.size(); ++i) {
+        const glm::uvec4 q = mesh.quads[i];
         add(q.x, q.y, q.z);
         add(q.x, q.z, q.w);
     }
     for (const auto& [v, sum] : sums) {
         const double length = std::max({std::abs(sum[0]), std::abs(sum[1]), std::abs(sum[2])});
-        mesh.normals[v] = glm::vec3(0, 0, 1); // of a vertex whose faces cancel each other
+        glm::vec3 normal(0, 0, 1); // of a vertex whose faces cancel each other
         if (length > 0)
-            mesh.normals[v] = resolved_normal({static_cast<float>(sum[0] / length), static_cast<float>(sum[1] / length),
-                                               static_cast<float>(sum[2] / length)});
+            normal = resolved_normal({static_cast<float>(sum[0] / length), static_cast<float>(sum[1] / length),
+                                      static_cast<float>(sum[2] / length)});
+        mesh.normals.set(v, normal);
     }
 }
 
-// The mesh that the request asks for; in_bricks: its samples lie in bricks, which changes nothing of it. Adds the
-// counts and the time. Throws std::bad_alloc, and std::runtime_error for what the library refuses.
+// A mesh's components: vertices that faces join. Holds four bytes a vertex.
+[[nodiscard]] inline std::uint64_t count_components(const surface_mesh& mesh) {
+    std::vector<std::uint32_t> above(mesh.vertices.size());
+    for (std::size_t v = 0; v < above.size(); ++v) above[v] = static_cast<std::uint32_t>(v);
+    std::uint64_t components = above.size();
+    const auto top = [&above](std::uint32_t v) {
+        for (; above[v] != v; v = above[v]) above[v] = above[above[v]];
+        return v;
+    };
+    const surface_shape shape(mesh);
+    for (std::size_t f = 0; f < shape.faces(); ++f) {
+        const surface_shape::index_list face = shape.face(f);
+        for (std::size_t k = 1; k < shape.corners(); ++k) {
+            const std::uint32_t a = top(face[0]), b = top(face[k]);
+            if (a == b) continue;
+            above[b] = a;
+            --components;
+        }
+    }
+    return components;
+}
+
+// Makes the mesh that a request asks for. Refers to the model and the request. Throws std::bad_alloc, and
+// std::runtime_error for what the library refuses.
+template <class Backend>
+class scene_remesher {
+public:
+    scene_remesher(Backend& on, scene& model, const voxelize_request& request)
+        : on_{on}, request_{request}, options_{remesh_options_of(*request.remesh)},
+          start_{std::chrono::steady_clock::now()} {
+        wanted_targets wanted;
+        wanted[static_cast<std::size_t>(target::color)] = request.wants(target::color) && has_colors(model);
+        is_colored_ = wanted.any();
+        uploaded_.emplace(on, model, request, wanted, false);
+        for (const auto& d : uploaded_->draws()) draws_.push_back({d.mesh, d.vertex_shader, {d.fragment_shader}});
+    }
+
+    // At once. in_bricks: its samples lie in bricks, which changes nothing of it. Adds the counts and the time.
+    [[nodiscard]] surface_mesh whole(bool in_bricks, voxelize_stats& stats) {
+        made_type made(on_);
+        const vp::status status = in_bricks ? vp::remesh_sparse(on_, draws_, uploaded_->relative_grid(), made, options_)
+                                            : vp::remesh(on_, draws_, uploaded_->relative_grid(), made, options_);
+        if (status.code == vp::status_code::out_of_memory) throw std::bad_alloc{};
+        status.or_throw();
+        surface_mesh result = empty_mesh();
+        append(made, result);
+        result.counts = status.surface;
+        stats.triangles_drawn = status.counts.triangles_drawn;
+        finish(result, status.counts, status.solid, stats);
+        return result;
+    }
+
+    // A slab of the grid after the other, of `layers` or, where memory does not do, fewer, with the arrays in temporary
+    // files in `folder`: the same mesh, and the same counts.
+    [[nodiscard]] surface_mesh in_slabs(int layers, const std::filesystem::path& folder, voxelize_stats& stats) {
+        surface_mesh result = empty_mesh();
+        result.vertices = surface_list<vp::surface_vertex>(folder);
+        result.triangles = surface_list<glm::uvec3>(folder);
+        result.quads = surface_list<glm::uvec4>(folder);
+        result.sources = surface_list<std::uint32_t>(folder);
+        result.normals = surface_list<glm::vec3>(folder);
+        if (is_colored_) result.colors = surface_list<glm::vec3>(folder);
+        vp::counters counts;
+        vp::solid_counters solid;
+        vp::surface_slab slab;
+        stats.slabs = 0;
+        for (const int end = request_.grid.extent.z; slab.first < end;) {
+            slab.layers = std::min(layers, end - slab.first);
+            made_type made(on_);
+            vp::status status = count_rows(slab, solid);
+            if (status.ok()) status = vp::remesh_slab(on_, draws_, uploaded_->relative_grid(), slab, made, options_);
+            if (status.code == vp::status_code::out_of_memory && layers > 1) {
+                layers = (slab.layers + 1) / 2;
+                continue;
+            }
+            if (status.code == vp::status_code::out_of_memory) throw std::bad_alloc{};
+            status.or_throw();
+            append(made, result);
+            vp::surface_counters& sum = result.counts;
+            sum.vertices += status.surface.vertices;
+            sum.faces += status.surface.faces;
+            sum.made_crossings += status.surface.made_crossings;
+            sum.cone_crossings += status.surface.cone_crossings;
+            sum.nearest_values += status.surface.nearest_values;
+            counts = status.counts;
+            stats.triangles_drawn += status.counts.triangles_drawn;
+            ++stats.slabs;
+            slab.first += slab.layers;
+            slab.first_vertex += status.surface.vertices;
+        }
+        draws_.clear();
+        uploaded_.reset();
+        result.counts.components = count_components(result);
+        finish(result, counts, solid, stats);
+        return result;
+    }
+
+private:
+    using draw = vp::draw<vp::mesh_view<>, surface_vertex_shader, remesh_shader>;
+    using made_type = vp::surface<Backend, glm::vec4, glm::vec3>;
+
+    [[nodiscard]] surface_mesh empty_mesh() const {
+        surface_mesh mesh;
+        for (std::size_t a = 0; a < 3; ++a) {
+            const auto axis = static_cast<glm::length_t>(a);
+            mesh.extent[a] = request_.grid.extent[axis];
+            mesh.origin[a] = request_.grid.part_origin()[axis];
+            mesh.voxel_size[a] = request_.grid.voxel_size[axis];
+        }
+        return mesh;
+    }
+    void append(const made_type& made, surface_mesh& to) const {
+        to.vertices.append(made.vertices.to_host(on_));
+        to.triangles.append(made.triangles.to_host(on_));
+        to.quads.append(made.quads.to_host(on_));
+        to.sources.append(made.sources.to_host(on_));
+        std::vector<glm::vec3> values;
+        for (const glm::vec3& mean : vp::get<1>(made).to_host(on_)) values.push_back(resolved_normal(mean));
+        to.normals.append(values);
+        if (!is_colored_) return;
+        values.clear();
+        for (const glm::vec4& mean : vp::get<0>(made).to_host(on_)) values.push_back(resolved_color(mean));
+        to.colors.append(values);
+    }
+    // Adds what a solid counts of the slab's own rows; remesh_slab has those of its neighbours', too.
+    [[nodiscard]] vp::status count_rows(const vp::surface_slab& slab, vp::solid_counters& all) {
+        const vp::grid whole = uploaded_->relative_grid();
+        const vp::grid part = whole.crop({0, 0, slab.first}, {whole.extent.x, whole.extent.y, slab.layers});
+        using bits_draw = vp::draw<vp::mesh_view<>, instanced_vertex_shader, decltype(vp::constant(true))>;
+        std::vector<bits_draw> draws;
+        for (const auto& d : uploaded_->bits_draws()) draws.push_back({d.mesh, d.vertex_shader, vp::constant(true)});
+        vp::framebuffer<Backend, vp::target<vp::bit, vp::blend::replace>> bits(on_, part.extent);
+        const vp::status status = vp::voxelize_solid(on_, draws, part, bits, vp::core::sign_options(options_));
+        if (!status.ok()) return status;
+        all.open_rows += status.solid.open_rows;
+        all.crossings += status.solid.crossings;
+        all.max_winding = std::max(all.max_winding, status.solid.max_winding);
+        all.hole_edges = status.solid.hole_edges;
+        all.holes = status.solid.holes;
+        all.cones = status.solid.cones;
+        return status;
+    }
+    void finish(surface_mesh& mesh, const vp::counters& triangles, const vp::solid_counters& solid,
+                voxelize_stats& stats) const {
+        fill_normals(mesh);
+        mesh.vertices.finish();
+        mesh.triangles.finish();
+        mesh.quads.finish();
+        mesh.sources.finish();
+        mesh.normals.finish();
+        mesh.colors.finish();
+        stats.triangles_dropped = triangles.triangles_dropped();
+        solid_counts& counts = stats.solid.emplace();
+        const glm::ivec3 extent = request_.grid.extent;
+        counts.rows = static_cast<std::uint64_t>(extent.y) * static_cast<std::uint64_t>(extent.z);
+        counts.open_rows = solid.open_rows;
+        counts.crossings = solid.crossings;
+        counts.max_winding = solid.max_winding;
+        counts.hole_edges = solid.hole_edges;
+        counts.holes = solid.holes;
+        counts.closed_holes = solid.cones;
+        if (std::string warning = open_warning(request_.remesh->sign, counts); !warning.empty())
+            stats.warnings.push_back("the sign of --remesh: " + warning);
+        if (mesh.vertices.empty())
+            stats.warnings.push_back("nothing lies inside of the model on this grid: the mesh is empty. Sheets and "
+                                     "open meshes enclose nothing; --close-holes, --solid exterior and --iso D above 0 "
+                                     "help");
+        const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - start_;
+        stats.milliseconds.emplace_back("remesh", time.count());
+    }
+
+    Backend& on_;
+    const voxelize_request& request_;
+    vp::remesh_options options_;
+    std::chrono::steady_clock::time_point start_;
+    bool is_colored_ = false;
+    std::optional<uploaded_scene<Backend>> uploaded_;
+    std::vector<draw> draws_;
+};
+
+// The whole mesh, as scene_remesher::whole makes it. Adds the counts and the time.
 template <class Backend>
 surface_mesh remesh_scene(Backend& on, scene& model, const voxelize_request& request, bool in_bricks,
                           voxelize_stats& stats) {
-    const auto start = std::chrono::steady_clock::now();
-    wanted_targets wanted;
-    wanted[static_cast<std::size_t>(target::color)] = request.wants(target::color) && has_colors(model);
-    const bool is_colored = wanted.any();
-    const uploaded_scene<Backend> uploaded(on, model, request, wanted, false);
-    using draw = vp::draw<vp::mesh_view<>, surface_vertex_shader, remesh_shader>;
-    std::vector<draw> draws;
-    for (const auto& d : uploaded.draws()) draws.push_back({d.mesh, d.vertex_shader, {d.fragment_shader}});
-    vp::surface<Backend, glm::vec4, glm::vec3> made(on);
-    const vp::remesh_options options = remesh_options_of(*request.remesh);
-    const vp::status status = in_bricks ? vp::remesh_sparse(on, draws, uploaded.relative_grid(), made, options)
-                                        : vp::remesh(on, draws, uploaded.relative_grid(), made, options);
-    if (status.code == vp::status_code::out_of_memory) throw std::bad_alloc{};
-    status.or_throw();
-    surface_mesh result;
-    for (std::size_t a = 0; a < 3; ++a) {
-        const auto axis = static_cast<glm::length_t>(a);
-        result.extent[a] = request.grid.extent[axis];
-        result.origin[a] = request.grid.part_origin()[axis];
-        result.voxel_size[a] = request.grid.voxel_size[axis];
-    }
-    result.vertices = made.vertices.to_host(on);
-    result.triangles = made.triangles.to_host(on);
-    result.quads = made.quads.to_host(on);
-    result.sources = made.sources.to_host(on);
-    for (const glm::vec3& mean : vp::get<1>(made).to_host(on)) result.normals.push_back(resolved_normal(mean));
-    if (is_colored)
-        for (const glm::vec4& mean : vp::get<0>(made).to_host(on)) result.colors.push_back(resolved_color(mean));
-    fill_normals(result);
-    result.counts = status.surface;
-    stats.triangles_dropped = status.counts.triangles_dropped();
-    stats.triangles_drawn = status.counts.triangles_drawn;
-    solid_counts& counts = stats.solid.emplace();
-    counts.rows = static_cast<std::uint64_t>(request.grid.extent.y) * static_cast<std::uint64_t>(request.grid.extent.z);
-    counts.open_rows = status.solid.open_rows;
-    counts.crossings = status.solid.crossings;
-    counts.max_winding = status.solid.max_winding;
-    counts.hole_edges = status.solid.hole_edges;
-    counts.holes = status.solid.holes;
-    counts.closed_holes = status.solid.cones;
-    if (std::string warning = open_warning(request.remesh->sign, counts); !warning.empty())
-        stats.warnings.push_back("the sign of --remesh: " + warning);
-    if (result.vertices.empty())
-        stats.warnings.push_back("nothing lies inside of the model on this grid: the mesh is empty. Sheets and open "
-                                 "meshes enclose nothing; --close-holes, --solid exterior and --iso D above 0 help");
-    const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - start;
-    stats.milliseconds.emplace_back("remesh", time.count());
-    return result;
+    return scene_remesher<Backend>(on, model, request).whole(in_bricks, stats);
 }
 
 } // namespace voxelize

@@ -7,6 +7,8 @@
 #include "model/scene.hpp"
 #include "model/surface_mesh.hpp"
 
+#include <filesystem>
+
 namespace voxelize {
 
 // What remeshing a model takes, about.
@@ -17,8 +19,11 @@ struct remesh_memory {
 [[nodiscard]] remesh_memory remesh_need(const scene& model, const voxelize_request& request);
 
 // request.remesh is set; request.grid is not cropped. Lines and points enclose nothing: a warning counts them. Nothing
-// inside gives an empty mesh, which a warning says. Throws memory_error with need and limit before anything is drawn,
-// backend_error for a GPU.
-[[nodiscard]] surface_mesh run_remesher(scene&& model, const voxelize_request& request, voxelize_stats& stats);
+// inside gives an empty mesh, which a warning says. What does not fit is made in slabs on the CPU, the same mesh, whose
+// arrays then are temporary files in `folder`; not with an embedded mesh, --solid exterior and --vote, which look at
+// the whole grid. Throws memory_error with need and limit before anything is drawn where that does not fit either,
+// write_error for the files, backend_error for a GPU.
+[[nodiscard]] surface_mesh run_remesher(scene&& model, const voxelize_request& request,
+                                        const std::filesystem::path& folder, voxelize_stats& stats);
 
 } // namespace voxelize
