@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Shared by the bindings of all languages: attributes that the CPU bakes into sparse framebuffers, which gives the
-// values of the voxels that have a fragment in the Morton order of the voxels, the same for every attribute of a mesh.
+// Shared by the bindings of all languages: attributes that are baked into sparse framebuffers, which gives the values
+// of the voxels that have a fragment in the Morton order of the voxels, the same for every attribute of a mesh.
 
 #include <bindings/bits.hpp>
 #include <bindings/value_rows.hpp>
@@ -20,7 +20,7 @@
 
 namespace voxelpipe::bindings {
 
-// A call's mesh, grid and values. The arrays are the caller's.
+// A call's mesh, grid and values. The arrays are the caller's, in the memory of the backend that draws.
 template <class T>
 struct bake_call {
     mesh_view<> mesh;
@@ -57,6 +57,16 @@ void divide(T* values, const std::uint32_t* counts, std::size_t n, std::size_t c
     return coordinates;
 }
 
+// The same of a framebuffer that may lie on a device.
+template <class Backend, class... Targets>
+[[nodiscard]] std::vector<std::int32_t> coordinates_of(const sparse_framebuffer<Backend, Targets...>& fb,
+                                                       Backend& backend) {
+    if constexpr (requires { Backend::runs_on_host; })
+        return coordinates_of(fb.view().table);
+    else
+        return coordinates_of(fb.to_host(backend).table());
+}
+
 // The tiles of a table, four numbers for each: its first voxel (x, y, z), and its side in voxels.
 [[nodiscard]] inline std::vector<std::int32_t> cubes_of(const brick_table& table) {
     std::vector<std::int32_t> cubes;
@@ -77,24 +87,39 @@ struct sparse_values {
     status result;
 };
 
-template <class T, int Components, class Blend>
-[[nodiscard]] sparse_values<T> draw_sparse_values(const bake_call<T>& call, bool is_mean, bool with_voxels) {
+// Draws on any backend. Sums are divided on the host by call.threads threads: a device's quotient of NaN has other
+// bits.
+template <class T, int Components, class Blend, class Backend>
+[[nodiscard]] sparse_values<T> draw_sparse_values(Backend& backend, const bake_call<T>& call, bool is_mean,
+                                                  bool with_voxels) {
     using value = value_of<T, Components>;
     static_assert(sizeof(value) == Components * sizeof(T));
-    cpu_backend backend{call.threads};
-    sparse_framebuffer<cpu_backend, target<value, Blend>, number_of_fragments> fb{backend, call.where.extent};
+    sparse_framebuffer<Backend, target<value, Blend>, number_of_fragments> fb{backend, call.where.extent};
     sparse_values<T> drawn;
     drawn.result = voxelize(backend, call.mesh, call.where, passthrough{},
                             counted_value_shader<T, Components>{call.rows}, fb, voxelize_options{call.rule});
     if (!drawn.result.ok()) return drawn;
     drawn.num_voxels = fb.num_voxels();
-    if (with_voxels) drawn.coordinates = coordinates_of(fb.view().table);
-    const auto& values = get<0>(fb.contents().values);
-    const auto& counts = get<1>(fb.contents().values);
     drawn.values.resize(drawn.num_voxels * Components);
-    if (drawn.num_voxels != 0) std::memcpy(drawn.values.data(), values.data(), drawn.num_voxels * sizeof(value));
-    if (is_mean) divide(drawn.values.data(), counts.data(), drawn.num_voxels, Components, call.threads);
+    const auto take = [&](const brick_table& table, const value* values, const std::uint32_t* counts) {
+        if (with_voxels) drawn.coordinates = coordinates_of(table);
+        if (drawn.num_voxels != 0) std::memcpy(drawn.values.data(), values, drawn.num_voxels * sizeof(value));
+        if (is_mean) divide(drawn.values.data(), counts, drawn.num_voxels, Components, call.threads);
+    };
+    if constexpr (requires { Backend::runs_on_host; }) {
+        const auto& lists = fb.contents().values;
+        take(fb.view().table, get<0>(lists).data(), get<1>(lists).data());
+    } else {
+        const auto copied = fb.to_host(backend);
+        take(copied.table(), get<0>(copied.values).data(), get<1>(copied.values).data());
+    }
     return drawn;
+}
+
+template <class T, int Components, class Blend>
+[[nodiscard]] sparse_values<T> draw_sparse_values(const bake_call<T>& call, bool is_mean, bool with_voxels) {
+    cpu_backend backend{call.threads};
+    return draw_sparse_values<T, Components, Blend>(backend, call, is_mean, with_voxels);
 }
 
 // Of three columns the first ones: a lone column is drawn as one of three where that is rare, a third of the time to

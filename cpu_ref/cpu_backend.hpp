@@ -134,6 +134,17 @@ public:
             for (std::uint64_t i = b * block; i < last; ++i) f(i);
         });
     }
+    // What calls of f(i, add) gave to add(item), for i below `count`, in the order of i. Threads keep items until their
+    // number is known.
+    template <class Item, class F>
+    [[nodiscard]] cpu::collected_items<Item> collect(std::uint64_t count, const F& f) const {
+        return {execution(nullptr).threads, count, f};
+    }
+    // Calls f(number, item) for all of them, and frees them on the way.
+    template <class Item, class F>
+    void take(cpu::collected_items<Item>&& items, const F& f) const {
+        items.take(execution(nullptr).threads, f);
+    }
     // offsets[i] becomes the sum of the counts before i. The last count must be 0; returns the total.
     std::uint64_t sum(const buffer<std::uint32_t>& counts, buffer<std::uint64_t>& offsets) const {
         std::exclusive_scan(counts.data(), counts.data() + counts.size(), offsets.data(), std::uint64_t{0});

@@ -128,6 +128,9 @@ configure() {
     }
 }
 
+# wine64: Debian's package of that name alone has no command on PATH.
+wine64_path() { command -v wine64 || printf '%s\n' /usr/lib/wine/wine64; }
+
 # fetch_sources FOLDER PACKAGE...: the sources of this machine's distribution, with its patches, unpacked in FOLDER/src. Needs no root.
 fetch_sources() {
     local folder=$1 apt

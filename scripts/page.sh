@@ -7,7 +7,7 @@
 #
 #   scripts/page.sh             the page
 #   scripts/page.sh --check     then drives it in Chromium and compares its files with those of the tool of this machine, and the
-#                               golden hashes of the library and of the tool's files as WebAssembly with tests/golden/hashes.txt
+#                               golden hashes as WebAssembly with tests/golden/hashes.txt: of the library in Chromium, of that and of the tool's files in node
 #
 # The compiler and the C library are zig's. The C++ library is built here from zig's sources, with exceptions, which zig's own lacks
 # (packaging/page). Libraries are built from the sources of the machine's distribution, as for wheels. Needs apt-get and a package index
@@ -120,7 +120,8 @@ build/test/tests/golden/golden_hashes --write-model "$folder/models"
 large=()
 for file in ../shared/gltf/DamagedHelmet.glb; do [[ ! -e $file ]] || large+=("$file"); done
 .venv/bin/python packaging/page/test_page.py "$(command -v chromium || command -v chromium-browser || command -v google-chrome)" \
-    "$folder/voxelize.html" build/test/tool/voxelize "$folder/models" "$folder/test" "${large[@]}"
+    "$folder/voxelize.html" build/test/tool/voxelize "$folder/models" "$folder/test" \
+    "$folder/tool/tests/golden/golden_hashes.wasm" tests/golden/hashes.txt "${large[@]}"
 
 say "comparing golden hashes"
 scripts/golden.sh --build "$folder/tool" node "$root/packaging/page/run.mjs" >"$folder/hashes.txt"

@@ -10,6 +10,7 @@
 #   no_fmad     the same with --fmad=false
 #   plain_constexpr  part of it, built without --expt-relaxed-constexpr
 #   tool        the files that voxelize writes on the GPU against those that it writes on the CPU, and against golden hashes
+#   capi        the C API on the GPU: known results, errors, and all calls against the CPU's bytes
 #   sanitizer   compute-sanitizer memcheck, racecheck, initcheck and synccheck over a reduced suite, sparse framebuffers, solids
 #               and slabs among it; of a program that fails, the record says how often each kernel was reported
 # VOXELPIPE_CUDA_FLAGS: further options for nvcc, which the record names; --Ofast-compile=mid halves the time to build.
@@ -21,7 +22,7 @@
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 parts=("$@")
-[[ ${#parts[@]} -gt 0 ]] || parts=(default fast_math no_fmad plain_constexpr tool sanitizer)
+[[ ${#parts[@]} -gt 0 ]] || parts=(default fast_math no_fmad plain_constexpr tool capi sanitizer)
 step="${VOXELPIPE_STEP:-all}"
 at_once="${VOXELPIPE_AT_ONCE:-1}"
 [[ $step == all || $step == build || $step == run ]] || die "VOXELPIPE_STEP is build or run"
@@ -129,16 +130,28 @@ reported_kernels() {
         }
         END { for (c in count) printf "    %8d  %s\n", count[c], c }' "$1" | sort -rn | sed -n 1,80p
 }
+# run_plain PART LABEL COMMAND...: a test that is not GoogleTest's counts as one: 0 has passed, 77 was not run.
+run_plain() {
+    [[ $step != build ]] || return 0
+    [[ -z ${VOXELPIPE_PROGRAMS:-} || $2 =~ $VOXELPIPE_PROGRAMS ]] || return 0
+    local part=$1 name=$2 start=$SECONDS status=0 log
+    shift 2
+    log="build/gpu-$part-$name.log"
+    timeout "${VOXELPIPE_PROGRAM_SECONDS:-900}" "$@" >"$log" 2>&1 || status=$?
+    printf '%-15s %-28s %8d %8d %8d %8d\n' "$part" "$name" $((status == 0)) $((status != 0 && status != 77)) $((status == 77)) \
+        $((SECONDS - start)) | tee -a "$record"
+    [[ $status -eq 0 || $status -eq 77 ]] || sed -n 1,40p "$log"
+}
 # end_programs: waits for what VOXELPIPE_AT_ONCE has started.
 end_programs() { while [[ -n $(jobs -pr) ]]; do wait -n || true; done; }
 
-# build_suite FOLDER FLAG... (with target="..." those instead of the device tests, samples="ON" with the tool)
+# build_suite FOLDER FLAG... (with target="..." those instead of the device tests, samples="ON" with the tool, capi="ON" with the C API)
 build_suite() {
     local folder=$1
     shift
     [[ $step != run ]] || return 0
     cmake -S . -B "build/$folder" -G Ninja -DCMAKE_BUILD_TYPE=Release -DVOXELPIPE_ENABLE_CUDA=ON -DVOXELPIPE_BUILD_TESTS=ON \
-        -DVOXELPIPE_BUILD_SAMPLES="${samples:-OFF}" -DVOXELPIPE_BUILD_BENCH=OFF -DCMAKE_CUDA_ARCHITECTURES="$architecture" \
+        -DVOXELPIPE_BUILD_SAMPLES="${samples:-OFF}" -DVOXELPIPE_BUILD_CAPI="${capi:-OFF}" -DVOXELPIPE_BUILD_BENCH=OFF -DCMAKE_CUDA_ARCHITECTURES="$architecture" \
         -DCMAKE_CUDA_FLAGS="$* ${VOXELPIPE_CUDA_FLAGS:-}" ${CMAKE_PREFIX_PATH:+-DCMAKE_PREFIX_PATH="$CMAKE_PREFIX_PATH"} \
         $([[ -d .deps ]] && printf -- '-DCMAKE_PREFIX_PATH=%s/.deps' "$root") >"build/configure-$folder.log" 2>&1 ||
         { tail -n 40 "build/configure-$folder.log"; die "cmake could not configure $folder"; }
@@ -216,6 +229,12 @@ for part in "${parts[@]}"; do
         run_golden tool gpu-tool
         samples=ON target=gi_gpu_test build_suite gpu-tool
         run_program tool gi_gpu_test build/gpu-tool/tests/gi/gi_gpu_test
+        ;;
+    capi)
+        capi=ON target="voxelpipe_c capi_test backends_test" build_suite gpu-capi
+        run_plain capi capi_test build/gpu-capi/tests/capi/capi_test cuda
+        run_plain capi backends_test build/gpu-capi/tests/capi/backends_test
+        run_plain capi capi_test.py python3 tests/capi/capi_test.py build/gpu-capi/capi/libvoxelpipe.so capi/include/voxelpipe.h cuda
         ;;
     sanitizer)
         [[ $step == build ]] || command -v compute-sanitizer >/dev/null || die "compute-sanitizer is not on PATH: nothing was checked"

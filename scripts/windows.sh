@@ -56,8 +56,7 @@ say "$tool"
 
 need_packages "${build_packages[@]}" libgtest-dev wine64 python3
 cmake --build build/windows --target golden_hashes -j "$jobs"
-wine=/usr/lib/wine/wine64 # Debian's package wine64 alone has no name on PATH
-! command -v wine64 >/dev/null || wine=wine64
+wine=$(wine64_path)
 export WINEDEBUG=-all
 say "running its test under wine"
 tests/tool/windows_test.sh "$tool" "$wine"

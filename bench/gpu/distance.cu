@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// Distance fields on a GPU, by scene and grid: the whole call into a dense target and into sparse bricks, band 3, with
-// and without a sign, and whole fields of the second scene; the times of the stages; and the target that the project
-// has set itself. Prints a table of medians; --out writes it as CSV too.
+// Distance fields on a GPU, by scene, grid and band: the whole call into a dense target and into sparse bricks, with
+// and without a sign, whole fields of the dragon, and the dragon less a twentieth of its triangles with signs by
+// winding numbers; the times of the stages; and the target that the project has set itself. Prints a table of medians;
+// --out writes it as CSV too.
 
 #include "output.hpp"
 #include "run.hpp"
@@ -24,7 +25,8 @@ namespace vp = voxelpipe;
 using namespace bench;
 
 struct options : gpu::run_options {
-    bool dense = true, sparse = true, whole = true;
+    std::vector<std::string> bands{"3"}; // voxels
+    bool dense = true, sparse = true, whole = true, open = true;
 };
 
 // Milliseconds of another library on an H200: its fastest of several batches, without and with a sign.
@@ -44,9 +46,10 @@ double published_peer(std::string_view scene, int n, bool has_sign) {
         if (p.scene == scene && p.resolution == n) return has_sign ? p.with_sign : p.plain;
     return 0;
 }
-// Milliseconds that a call should take at most, sign included; 0: none is set.
-double target_of(std::string_view scene, int n, bool is_whole, bool has_sign, std::string_view output) {
-    if (is_whole) return scene == "dragon" && n == 256 ? 25 : scene == "dragon" && n == 512 ? 150 : 0;
+// Milliseconds that a call should take at most, sign included; 0: none is set. band: voxels; 0: the whole field.
+double target_of(std::string_view scene, int n, double band, bool has_sign, std::string_view output) {
+    if (band == 0) return scene == "dragon" && n == 256 ? 25 : scene == "dragon" && n == 512 ? 150 : 0;
+    if (band != 3) return 0;
     if (scene == "dragon" && n == 1024 && has_sign && output == "bricks") return 3.5;
     return published_peer(scene, n, false) / 4.5; // no cell below
 }
@@ -60,11 +63,11 @@ struct measured {
     vp::stage_times stages;
 };
 
-template <class Output>
-measured measure(gpu::session& session, vp::cuda_backend& backend, const draw_type& d, const vp::grid& g, Output& out,
-                 const vp::distance_options& o, const gpu::repetition& repeat) {
+// draw: a call that waits, and returns its status.
+template <class Draw>
+measured measure(gpu::session& session, vp::cuda_backend& backend, const gpu::repetition& repeat, const Draw& draw) {
     const auto call = [&] {
-        const vp::status s = vp::voxelize_distance(backend, std::span<const draw_type>(&d, 1), g, out, o);
+        const vp::status s = draw();
         if (s.code == vp::status_code::out_of_memory) throw gpu::out_of_device_memory(s.message());
         s.or_throw();
         return s;
@@ -78,6 +81,29 @@ measured measure(gpu::session& session, vp::cuda_backend& backend, const draw_ty
     return m;
 }
 
+// The mesh less about one in twenty of its triangles.
+mesh_data with_holes(const mesh_data& whole) {
+    mesh_data open = whole;
+    open.name += " less 5 %";
+    open.triangles.clear();
+    for (std::size_t i = 0; i < whole.triangles.size(); ++i)
+        if ((static_cast<std::uint32_t>(i) * 2654435761u >> 16) % 20 != 0) open.triangles.push_back(whole.triangles[i]);
+    return open;
+}
+
+// A mesh on the device, and its draw.
+struct drawn_mesh {
+    gpu::resident_mesh mesh;
+    draw_type draw;
+
+    drawn_mesh(vp::cuda_backend& backend, const mesh_data& data) : mesh(gpu::upload(data)) {
+        vp::mesh_view<> view{{mesh.positions.data(), mesh.positions.size()},
+                             {mesh.triangles.data(), mesh.triangles.size()}};
+        view.checked = vp::check_indices(backend, view.triangles);
+        draw = {view, {}, {}};
+    }
+};
+
 int run(const options& how, const std::string& command) {
     gpu::session session;
     gpu::clock_watch watch;
@@ -89,57 +115,84 @@ int run(const options& how, const std::string& command) {
     const auto ratio = [](double a, double b) { return a > 0 && b > 0 ? significant(a / b) : std::string{}; };
     std::vector<double> ahead[2]; // of the peer without a sign: dense, bricks
     bool failed = false;
+    const auto add = [&](const mesh_data& data, int n, double band, const std::string& sign, const std::string& output,
+                         double target_ms, const measured& m) {
+        watch.read();
+        const bool has_sign = sign == "nonzero";
+        const double peer = band != 3 || sign == "winding" ? 0 : published_peer(data.name, n, has_sign);
+        if (peer > 0 && !has_sign) ahead[output == "bricks" ? 1 : 0].push_back(peer / m.time.median);
+        const std::string width = band == 0 ? "whole" : significant(band);
+        rows.add_row({data.name, std::to_string(n), width, sign, output, std::to_string(data.triangles.size()),
+                      std::to_string(m.status.distance.band_samples), ms(m.time.median), ms(target_ms),
+                      ratio(target_ms, m.time.median), ms(peer), ratio(peer, m.time.median),
+                      ms(m.stages.vertex_shade + m.stages.coarse_raster + m.stages.tile_sort), ms(m.stages.fine_raster),
+                      ms(m.stages.clear + m.stages.tile_resolve)});
+        say(data.name + " " + std::to_string(n) + " " + width + " " + sign + " " + output + " " +
+            significant(m.time.median) + " ms");
+    };
+    // Calls f(output, measured) for each target. band: 0 for the whole field.
+    const auto fields = [&](const draw_type& d, const vp::grid& g, double band, vp::distance_options o, const auto& f) {
+        vp::cuda_backend backend(session.stream());
+        o.band = band == 0 ? vp::band::whole : vp::band(band);
+        const auto into = [&](auto& fb) {
+            return measure(session, backend, how.repeat,
+                           [&] { return vp::voxelize_distance(backend, std::span<const draw_type>(&d, 1), g, fb, o); });
+        };
+        if (how.dense || band == 0) {
+            vp::framebuffer<vp::cuda_backend, target> fb(backend, g.extent);
+            f("dense", into(fb));
+        }
+        if (how.sparse && band != 0) {
+            vp::sparse_framebuffer<vp::cuda_backend, target> fb(backend, g.extent);
+            f("bricks", into(fb));
+        }
+    };
+    const auto guarded = [&](const mesh_data& data, int n, const auto& cell) {
+        try {
+            vp::cuda_backend backend(session.stream());
+            const drawn_mesh d(backend, data);
+            cell(backend, d.draw, vp::fit(data.positions, glm::ivec3(n)));
+        } catch (const std::exception& e) {
+            failed = true;
+            notes.push_back("failed: " + data.name + " " + std::to_string(n) + ": " + e.what());
+            say(notes.back());
+        }
+        session.trim();
+    };
+    const auto both_signs = [&](const mesh_data& data, int n, double band) {
+        guarded(data, n, [&](vp::cuda_backend&, const draw_type& d, const vp::grid& g) {
+            for (const bool has_sign : {false, true})
+                fields(d, g, band, {.sign = has_sign ? vp::distance_sign::inside : vp::distance_sign::none},
+                       [&](const std::string& output, const measured& m) {
+                           add(data, n, band, has_sign ? "nonzero" : "none", output,
+                               target_of(data.name, n, band, has_sign, output), m);
+                       });
+        });
+    };
+    // Signs of an open mesh: of the band, and of all samples as bits.
+    const auto winding = [&](const mesh_data& data, int n) {
+        guarded(data, n, [&](vp::cuda_backend& backend, const draw_type& d, const vp::grid& g) {
+            fields(d, g, 3, {.repair = vp::repair::winding}, [&](const std::string& output, const measured& m) {
+                add(data, n, 3, "winding", output, n == 1024 ? 6 : 0, m);
+            });
+            vp::framebuffer<vp::cuda_backend, vp::target<vp::bit, vp::blend::bit_or>> bits(backend, g.extent);
+            const measured m = measure(session, backend, how.repeat, [&] {
+                return vp::voxelize_solid(
+                    backend, d.mesh, g, vp::passthrough{}, vp::constant(true), bits,
+                    vp::solid_options{.extent = vp::solid_extent::centre, .repair = vp::repair::winding});
+            });
+            add(data, n, 0, "winding", "bits", n == 1024 ? 10 : 0, m);
+        });
+    };
     for (const std::string& name : names) {
         const mesh_data data = find_mesh(how.scenes, name);
-        const gpu::resident_mesh mesh = gpu::upload(data);
-        const auto cells = [&](int n, bool is_whole) {
-            vp::cuda_backend backend(session.stream());
-            vp::mesh_view<> view{{mesh.positions.data(), mesh.positions.size()},
-                                 {mesh.triangles.data(), mesh.triangles.size()}};
-            view.checked = vp::check_indices(backend, view.triangles);
-            const draw_type d{view, {}, {}};
-            const vp::grid g = vp::fit(data.positions, glm::ivec3(n));
-            const auto add = [&](const std::string& output, bool has_sign, const measured& m) {
-                watch.read();
-                const double target_ms = target_of(data.name, n, is_whole, has_sign, output),
-                             peer = is_whole ? 0 : published_peer(data.name, n, has_sign);
-                if (peer > 0 && !has_sign) ahead[output == "bricks" ? 1 : 0].push_back(peer / m.time.median);
-                rows.add_row({data.name, std::to_string(n), is_whole ? "whole" : "3", has_sign ? "nonzero" : "none",
-                              output, std::to_string(data.triangles.size()),
-                              std::to_string(m.status.distance.band_samples), ms(m.time.median), ms(target_ms),
-                              ratio(target_ms, m.time.median), ms(peer), ratio(peer, m.time.median),
-                              ms(m.stages.vertex_shade + m.stages.coarse_raster + m.stages.tile_sort),
-                              ms(m.stages.fine_raster), ms(m.stages.clear + m.stages.tile_resolve)});
-                say(data.name + " " + std::to_string(n) + (is_whole ? " whole " : " ") + (has_sign ? "sign " : "") +
-                    output + " " + significant(m.time.median) + " ms");
-            };
-            for (const bool has_sign : {false, true}) {
-                vp::distance_options o;
-                if (is_whole) o.band = vp::band::whole;
-                if (!has_sign) o.sign = vp::distance_sign::none;
-                if (how.dense || is_whole) {
-                    vp::framebuffer<vp::cuda_backend, target> fb(backend, g.extent);
-                    add("dense", has_sign, measure(session, backend, d, g, fb, o, how.repeat));
-                }
-                if (how.sparse && !is_whole) {
-                    vp::sparse_framebuffer<vp::cuda_backend, target> fb(backend, g.extent);
-                    add("bricks", has_sign, measure(session, backend, d, g, fb, o, how.repeat));
-                }
-            }
-            session.trim();
-        };
-        const auto guarded = [&](int n, bool is_whole) {
-            try {
-                cells(n, is_whole);
-            } catch (const std::exception& e) {
-                failed = true;
-                notes.push_back("failed: " + name + " " + std::to_string(n) + ": " + e.what());
-                say(notes.back());
-            }
-        };
-        for (const int n : how.resolutions) guarded(n, false);
-        if (how.whole && data.name == "dragon")
-            for (const int n : {256, 512}) guarded(n, true);
+        for (const int n : how.resolutions)
+            for (const std::string& band : how.bands) both_signs(data, n, std::stod(band));
+        if (data.name != "dragon") continue;
+        if (how.whole)
+            for (const int n : {256, 512}) both_signs(data, n, 0);
+        if (how.open)
+            for (const int n : {512, 1024}) winding(with_holes(data), n);
     }
     notes.push_back("ahead of the peer without a sign, geometric means: dense " +
                     significant(geometric_mean(ahead[0])) + ", bricks " + significant(geometric_mean(ahead[1])));
@@ -165,8 +218,10 @@ int main(int argc, char** argv) {
                       "cuda_backend's times of distance fields next to targets and quoted figures", how,
                       "gpu_distance.md and gpu_distance.csv");
     line.add_meshes();
+    line.add("--band", how.bands, "Width of the band in voxels; may be repeated");
     line.add_flag("!--no-dense", how.dense, "Leave out dense targets");
     line.add_flag("!--no-sparse", how.sparse, "Leave out sparse bricks");
     line.add_flag("!--no-whole", how.whole, "Leave out whole fields");
+    line.add_flag("!--no-open", how.open, "Leave out the open mesh, whose signs are by winding numbers");
     return line.run(argc, argv, [&](const std::string& typed) { return run(how, typed); });
 }

@@ -9,6 +9,7 @@ Ten closed meshes that this script makes: plain ones, and those on which signs g
 shells, parts that touch. Points are drawn around and near the surface, with coordinates of float32, so that all get the same. The truth is brute
 force in double: the least distance over all triangles, and the winding number as a sum of solid angles. Points nearer than 1e-6 of the mesh's size, on which
 that sum decides nothing, are left out of the signs. voxelpipe snaps points and vertices to a lattice of 2^-24 of the grid: its error here is that of the lattice.
+OpenVDB has values at the voxels of its grid alone, 256 along the mesh: it is asked, and judged, at those that are nearest to the points.
 A peer that is not installed is left out and named. Versions are printed.
 """
 import argparse
@@ -154,15 +155,19 @@ def with_vtk(mesh, points):
     return vtk_to_numpy(result).copy()
 
 
+def openvdb_voxel(mesh):
+    return float(np.ptp(mesh[0], axis=0).max()) / 256
+
+
 def with_openvdb(mesh, points):
-    """A level set of 256 voxels along the mesh, sampled at the voxel of each point: distances of those within its band alone."""
+    """A level set of 256 voxels along the mesh, at its voxels `points`: distances of those within its band alone."""
     import pyopenvdb as vdb
 
-    size = float(np.ptp(mesh[0], axis=0).max()) / 256
+    size = openvdb_voxel(mesh)
     grid = vdb.FloatGrid.createLevelSetFromPolygons(
         mesh[0], mesh[1], transform=vdb.createLinearTransform(voxelSize=size), halfWidth=3)
     accessor = grid.getConstAccessor()
-    return np.array([accessor.getValue(tuple(int(i) for i in p)) for p in np.rint(points / np.float32(size))])
+    return np.array([accessor.getValue(tuple(int(i) for i in p)) for p in np.rint(points / size)])
 
 
 def with_warp(mesh, points):
@@ -205,21 +210,28 @@ def main():
     lines.append("mesh                 triangles  checked  " + "".join(f"{n:>20}" for n, v in versions.items() if v))
     for number, (name, mesh) in enumerate(all_meshes().items()):
         points = samples(mesh, options.points, np.random.default_rng([options.seed, number]))
-        distance, winding = truth(mesh, points)
         size = float(np.ptp(mesh[0], axis=0).max())
-        is_clear = (distance > 1e-6 * size) & (np.abs(np.abs(winding) - 0.5) > 0.25)
-        is_inside = np.abs(winding) > 0.5
-        row = f"{name:20} {len(mesh[1]):9}  {int(is_clear.sum()):7}  "
+
+        def judged_at(where):
+            distance, winding = truth(mesh, where)
+            is_clear = (distance > 1e-6 * size) & (np.abs(np.abs(winding) - 0.5) > 0.25)
+            return where, distance, is_clear, np.abs(winding) > 0.5
+
+        all_points = judged_at(points)
+        voxel = openvdb_voxel(mesh)
+        voxels = judged_at(np.rint(points / voxel) * voxel) if versions["openvdb"] else None
+        row = f"{name:20} {len(mesh[1]):9}  {int(all_points[2].sum()):7}  "
         for peer, call in PEERS.items():
             if not versions[peer]:
                 continue
+            where, distance, is_clear, is_inside = voxels if peer == "openvdb" else all_points
             try:
-                found = np.asarray(call(mesh, points), np.float64)
+                found = np.asarray(call(mesh, where), np.float64)
             except Exception as error:  # a peer that fails on a mesh is a result, too
                 row += f"{type(error).__name__[:18]:>20}"
                 continue
             wrong = int(((found < 0) != is_inside)[is_clear].sum())
-            counted = distance < 2 * size / 256 if peer == "openvdb" else np.ones(len(points), bool)
+            counted = distance < 2 * voxel if peer == "openvdb" else np.ones(len(where), bool)
             error = np.abs(np.abs(found) - distance)[counted].max() / size
             row += f"{wrong:>9} / {error:8.1e}"
         lines.append(row)

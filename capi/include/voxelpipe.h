@@ -59,7 +59,8 @@ enum {
     VP_ERROR_TOO_LARGE = 9,    /* more triangles or voxels than can be numbered */
     VP_ERROR_OUT_OF_MEMORY = 10,
     VP_ERROR_NO_BACKEND = 11, /* this library was built without the backend, or there is no device */
-    VP_ERROR_INTERNAL = 12    /* a fault of the library: please report the message */
+    VP_ERROR_INTERNAL = 12,   /* a fault of the library: please report the message */
+    VP_ERROR_DEVICE = 13      /* the device of VP_BACKEND_CUDA failed; the message has CUDA's text */
 };
 
 /* VP_ABI_VERSION of the library that is loaded. */
@@ -76,13 +77,17 @@ VP_API const char* vp_last_message(void);
 
 typedef struct vp_context vp_context;
 
+/* The results are the same bytes on each. VP_BACKEND_CUDA is the first device that CUDA shows the process
+ * (CUDA_VISIBLE_DEVICES); arrays are the host's all the same: each call copies its mesh to the device and its results
+ * back, on a stream of its own. */
 enum {
     VP_BACKEND_CPU = 0,
-    VP_BACKEND_CUDA = 1 /* reserved: VP_ERROR_NO_BACKEND in this version */
+    VP_BACKEND_CUDA = 1
 };
 
 /* abi_version: VP_ABI_VERSION. threads: at most 4096, 0 takes all cores; the results are the same for any
- * number. */
+ * number, and with VP_BACKEND_CUDA they do the host's part. VP_ERROR_NO_BACKEND where the library was built without
+ * CUDA, or where there is no device: a program that then takes VP_BACKEND_CPU has the same results. */
 VP_API vp_code vp_context_create(uint32_t abi_version, int32_t backend, uint32_t threads, vp_context** context);
 VP_API void vp_context_destroy(vp_context* context);
 

@@ -14,12 +14,7 @@
 #include <string>
 #include <vector>
 
-// What handles point to. `kind` tells one kind of handle from another.
-struct vp_context {
-    static constexpr std::uint64_t its_kind = 0x7670'636f'6e74'6578; // "vpcontex"
-    std::uint64_t kind = its_kind;
-    unsigned threads = 0;
-};
+// What handles point to; vp_context is in backend_calls.hpp. `kind` tells one kind of handle from another.
 struct vp_mesh {
     static constexpr std::uint64_t its_kind = 0x7670'6d65'7368'2020; // "vpmesh  "
     std::uint64_t kind = its_kind;

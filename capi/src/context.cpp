@@ -1,12 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-#include "calls.hpp"
+#include "backend_calls.hpp"
 
 #include <voxelpipe/config.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <memory>
 #include <new>
 #include <stdexcept>
 #include <system_error>
@@ -50,9 +51,20 @@ vp_code code_of(status_code code) {
         return VP_ERROR_TOO_LARGE;
     case status_code::out_of_memory:
         return VP_ERROR_OUT_OF_MEMORY;
+    case status_code::device_error:
+        return VP_ERROR_DEVICE;
     default:
         return VP_ERROR_INTERNAL;
     }
+}
+
+backend_calls calls_on_cuda(unsigned threads) {
+#if defined(VOXELPIPE_CAPI_CUDA)
+    return cuda_calls(threads);
+#else
+    (void)threads;
+    throw failure{VP_ERROR_NO_BACKEND, "this library was built without VP_BACKEND_CUDA"};
+#endif
 }
 
 } // namespace
@@ -172,9 +184,10 @@ const char* vp_code_name(vp_code code) {
         "VP_ERROR_OUT_OF_MEMORY",
         "VP_ERROR_NO_BACKEND",
         "VP_ERROR_INTERNAL",
+        "VP_ERROR_DEVICE",
     };
-    static_assert(std::size(names) == VP_ERROR_INTERNAL + 1);
-    return code >= 0 && code <= VP_ERROR_INTERNAL ? names[code] : "unknown code";
+    static_assert(std::size(names) == VP_ERROR_DEVICE + 1);
+    return code >= 0 && code <= VP_ERROR_DEVICE ? names[code] : "unknown code";
 }
 
 const char* vp_last_message(void) { return last_message.data(); }
@@ -187,12 +200,11 @@ vp_code vp_context_create(uint32_t abi_version, int32_t backend, uint32_t thread
                                                 " of the C interface, and this library has version " +
                                                 std::to_string(VP_ABI_VERSION)};
         check_enum(backend, VP_BACKEND_CUDA, "backend");
-        if (backend == VP_BACKEND_CUDA)
-            throw failure{VP_ERROR_NO_BACKEND, "this library was built without VP_BACKEND_CUDA"};
         if (threads > 4096) throw failure{VP_ERROR_BAD_OPTION, "threads is above 4096"};
-        auto* const made = new vp_context;
+        auto made = std::make_unique<vp_context>();
         made->threads = threads;
-        *context = made;
+        made->on = backend == VP_BACKEND_CUDA ? calls_on_cuda(threads) : cpu_calls(threads);
+        *context = made.release();
     });
 }
 

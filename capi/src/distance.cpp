@@ -1,15 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #include "arrays.hpp"
-
-#include <bindings/nearest.hpp>
-#include <bindings/parts.hpp>
-
-#include <cpu_ref/backend.hpp>
+#include "backend_calls.hpp"
 
 using namespace voxelpipe;
 using namespace voxelpipe::capi;
-using bindings::distance_and_nearest, bindings::distances, bindings::numbers;
 
 namespace {
 
@@ -41,34 +36,24 @@ extern "C" {
 vp_code vp_distance(vp_context* context, const vp_mesh* mesh, const vp_grid* grid, const vp_distance_options* options,
                     const vp_array* out, const vp_array* nearest, vp_counters* counters) {
     return guarded([&] {
-        const unsigned threads = checked_handle(context, "context").threads;
+        const vp_context& c = checked_handle(context, "context");
         const vp_mesh& m = checked_handle(mesh, "mesh");
         const voxelpipe::grid g = grid_of(grid);
         const distance_options o = distance_options_of(options);
         check_counters(counters);
         const glm::ivec3 extent = o.sample == sample::corner ? g.at_corners().extent : g.extent;
         const array_place to = place_of(out, "out", {VP_TYPE_FLOAT32}, extent);
-        cpu_backend backend{threads};
         if (nearest == nullptr) {
-            const auto draws =
-                bindings::draws_of_parts<draw<mesh_view<>, passthrough, distance>>(m.view(), m.parts, distance{});
-            finish(draw_into<float>(to, threads,
-                                    [&](float* d) {
-                                        return voxelize_distance(backend, draws, g,
-                                                                 framebuffer_view<distances>::on(extent, d), o);
-                                    }),
+            finish(draw_into<float>(to, c.threads,
+                                    [&](float* d) { return c.on.fields->distance_field(m, g, extent, o, d, nullptr); }),
                    counters);
             return;
         }
         const array_place to_nearest = place_of(nearest, "nearest", {VP_TYPE_INT64}, extent);
-        const auto draws = bindings::draws_of_parts<draw<mesh_view<>, passthrough, distance_and_nearest>>(
-            m.view(), m.parts, distance_and_nearest{});
-        finish(draw_into<float>(to, threads,
+        finish(draw_into<float>(to, c.threads,
                                 [&](float* d) {
-                                    return draw_into<std::int64_t>(to_nearest, threads, [&](std::int64_t* n) {
-                                        return voxelize_distance(backend, draws, g,
-                                                                 framebuffer_view<distances, numbers>::on(extent, d, n),
-                                                                 o);
+                                    return draw_into<std::int64_t>(to_nearest, c.threads, [&](std::int64_t* n) {
+                                        return c.on.fields->distance_field(m, g, extent, o, d, n);
                                     });
                                 }),
                counters);
@@ -79,7 +64,7 @@ vp_code vp_distance_at(vp_context* context, const vp_mesh* mesh, const vp_grid* 
                        const vp_distance_options* options, const float* points, uint64_t num_points,
                        uint64_t point_stride, float* distances_out, int64_t* nearest, vp_counters* counters) {
     return guarded([&] {
-        const unsigned threads = checked_handle(context, "context").threads;
+        const vp_context& c = checked_handle(context, "context");
         const vp_mesh& m = checked_handle(mesh, "mesh");
         const voxelpipe::grid g = grid_of(grid);
         const distance_options o = distance_options_of(options);
@@ -92,12 +77,7 @@ vp_code vp_distance_at(vp_context* context, const vp_mesh* mesh, const vp_grid* 
         std::vector<glm::vec3> at(num_points);
         const auto* from = reinterpret_cast<const unsigned char*>(points);
         for (std::uint64_t i = 0; i < num_points; ++i) std::memcpy(&at[i], from + i * point_stride, sizeof(glm::vec3));
-        cpu_backend backend{threads};
-        const auto draws =
-            bindings::draws_of_parts<draw<mesh_view<>, passthrough, distance>>(m.view(), m.parts, distance{});
-        finish(distance_at(backend, std::span<const draw<mesh_view<>, passthrough, distance>>(draws), g,
-                           array_view<const glm::vec3>(at.data(), at.size()), {distances_out, nearest}, o),
-               counters);
+        finish(c.on.fields->distances_at(m, g, o, at, distances_out, nearest), counters);
     });
 }
 

@@ -1,11 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-#include "calls.hpp"
+#include "backend_calls.hpp"
 
-#include <bindings/parts.hpp>
 #include <voxelpipe/cells/links.hpp>
-
-#include <cpu_ref/backend.hpp>
 
 #include <algorithm>
 #include <memory>
@@ -42,7 +39,7 @@ vp_code vp_link_direction(int32_t link, int32_t direction[3]) {
 vp_code vp_links_create(vp_context* context, const vp_mesh* mesh, const vp_grid* grid, const vp_link_options* options,
                         vp_links** links, vp_counters* counters) {
     return guarded([&] {
-        const unsigned threads = checked_handle(context, "context").threads;
+        const vp_context& c = checked_handle(context, "context");
         const vp_mesh& m = checked_handle(mesh, "mesh");
         check_pointer(links, "links");
         const voxelpipe::grid g = grid_of(grid);
@@ -50,18 +47,9 @@ vp_code vp_links_create(vp_context* context, const vp_mesh* mesh, const vp_grid*
         if (o.neighbours != 0 && o.neighbours != 18 && o.neighbours != most_links)
             throw failure{VP_ERROR_BAD_OPTION, "neighbours is " + std::to_string(o.neighbours) + ", not 18 or 26"};
         check_counters(counters);
-        const link_options how{o.neighbours == 0 ? 18 : o.neighbours};
         auto made = std::make_unique<vp_links>();
-        made->neighbours = static_cast<std::uint32_t>(how.neighbours);
-        cpu_backend backend{threads};
-        link_list<cpu_backend> found(backend);
-        using link_draw = draw<mesh_view<>, passthrough, none>;
-        finish(voxelize_links(backend, bindings::draws_of_parts<link_draw>(m.view(), m.parts, none{}), g, found, how),
-               counters);
-        made->voxels = found.voxels.to_host(backend);
-        made->q = found.q.to_host(backend);
-        made->triangles = found.primitives.to_host(backend);
-        made->parts = found.draws.to_host(backend);
+        if (o.neighbours != 0) made->neighbours = static_cast<std::uint32_t>(o.neighbours);
+        finish(c.on.fields->links(m, g, *made), counters);
         *links = made.release();
     });
 }

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-#include "calls.hpp"
+#include "backend_calls.hpp"
 
 #include <voxelpipe/grid.hpp>
 

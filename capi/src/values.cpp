@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #include "arrays.hpp"
-
-#include <bindings/sparse_values.hpp>
+#include "backend_calls.hpp"
 
 #include <algorithm>
 #include <memory>
@@ -11,13 +10,6 @@ using namespace voxelpipe;
 using namespace voxelpipe::capi;
 
 namespace {
-
-// Rows of values that were checked against the mesh.
-struct checked_rows {
-    bindings::value_rows<float> rows; // with the columns of the first pass
-    std::int32_t blend = VP_BLEND_MEAN;
-    std::uint32_t columns = 0;
-};
 
 checked_rows rows_of(const vp_rows* from, const vp_mesh& m) {
     const vp_rows& r = checked_struct(from, "rows");
@@ -38,52 +30,12 @@ checked_rows rows_of(const vp_rows* from, const vp_mesh& m) {
                                           "not aligned"};
     if (expected != 0 && stride > UINT64_MAX / 2 / expected)
         throw failure{VP_ERROR_BAD_ARRAY, "row_stride: more bytes than can be addressed"};
-    return {{r.values, static_cast<std::size_t>(stride / sizeof(float)), 0,
-             r.per == VP_ROWS_PER_TRIANGLE ? nullptr : m.triangles.data()},
+    return {r.values,
+            static_cast<std::size_t>(expected),
+            static_cast<std::size_t>(stride / sizeof(float)),
+            r.per == VP_ROWS_PER_TRIANGLE,
             r.blend,
             r.columns};
-}
-
-// The voxels and their values, three columns a pass.
-status draw_list(const vp_mesh& m, const grid& g, coverage rule, const checked_rows& rows, unsigned threads,
-                 vp_list& list) {
-    status s;
-    list.columns = rows.columns;
-    for (std::uint32_t first = 0; first < rows.columns; first += 3) {
-        bindings::bake_call<float> call{m.view(), g, rule, rows.rows, threads};
-        const std::uint32_t n = std::min(rows.columns - first, 3u);
-        call.rows.values += first;
-        call.rows.count = static_cast<int>(n);
-        const auto draw = [&]<class Blend>() {
-            return bindings::first_columns(
-                bindings::draw_sparse_values<float, 3, Blend>(call, rows.blend == VP_BLEND_MEAN, first == 0), n);
-        };
-        auto drawn = rows.blend == VP_BLEND_MIN    ? draw.operator()<blend::min>()
-                     : rows.blend == VP_BLEND_MAX  ? draw.operator()<blend::max>()
-                     : rows.blend == VP_BLEND_LAST ? draw.operator()<blend::replace>()
-                                                   : draw.operator()<blend::add>();
-        s = drawn.result;
-        if (!s.ok()) return s;
-        if (first == 0) list.coordinates = std::move(drawn.coordinates);
-        if (rows.columns <= 3) {
-            list.values = std::move(drawn.values);
-            break;
-        }
-        list.values.resize(drawn.num_voxels * rows.columns);
-        for (std::size_t i = 0; i < drawn.num_voxels; ++i)
-            for (std::uint32_t c = 0; c < n; ++c) list.values[i * rows.columns + first + c] = drawn.values[i * n + c];
-    }
-    return s;
-}
-
-// The voxels alone.
-status draw_list(const vp_mesh& m, const grid& g, coverage rule, unsigned threads, vp_list& list) {
-    using bits = target<bit, blend::bit_or>;
-    cpu_backend backend{threads};
-    sparse_framebuffer<cpu_backend, bits> fb{backend, g.extent};
-    const status s = voxelize(backend, m.view(), g, passthrough{}, constant(true), fb, voxelize_options{rule});
-    if (s.ok()) list.coordinates = bindings::coordinates_of(fb.view().table);
-    return s;
 }
 
 } // namespace
@@ -94,7 +46,7 @@ vp_code vp_surface_values(vp_context* context, const vp_mesh* mesh, const vp_gri
                           const vp_surface_options* options, const vp_rows* rows, const float* background,
                           const vp_array* out, vp_counters* counters) {
     return guarded([&] {
-        const unsigned threads = checked_handle(context, "context").threads;
+        const vp_context& c = checked_handle(context, "context");
         const vp_mesh& m = checked_handle(mesh, "mesh");
         const voxelpipe::grid g = grid_of(grid);
         const voxelize_options o = surface_options_of(options);
@@ -102,10 +54,10 @@ vp_code vp_surface_values(vp_context* context, const vp_mesh* mesh, const vp_gri
         const array_place to = place_of(out, "out", {VP_TYPE_FLOAT32}, g.extent, from.columns);
         check_counters(counters);
         vp_list list;
-        const status drawn = draw_list(m, g, o.rule, from, threads, list);
+        const status drawn = c.on.surfaces->list(m, g, o.rule, from, list);
         finish(drawn, nullptr);
         const std::size_t n = from.columns;
-        finish(draw_into<float>(to, threads,
+        finish(draw_into<float>(to, c.threads,
                                 [&](float* packed) {
                                     const std::size_t elements = to.elements();
                                     for (std::size_t i = 0; i < elements; ++i)
@@ -127,15 +79,15 @@ vp_code vp_surface_values(vp_context* context, const vp_mesh* mesh, const vp_gri
 vp_code vp_surface_list(vp_context* context, const vp_mesh* mesh, const vp_grid* grid,
                         const vp_surface_options* options, const vp_rows* rows, vp_list** list, vp_counters* counters) {
     return guarded([&] {
-        const unsigned threads = checked_handle(context, "context").threads;
+        const vp_context& c = checked_handle(context, "context");
         const vp_mesh& m = checked_handle(mesh, "mesh");
         check_pointer(list, "list");
         const voxelpipe::grid g = grid_of(grid);
         const voxelize_options o = surface_options_of(options);
         check_counters(counters);
         auto made = std::make_unique<vp_list>();
-        finish(rows == nullptr ? draw_list(m, g, o.rule, threads, *made)
-                               : draw_list(m, g, o.rule, rows_of(rows, m), threads, *made),
+        finish(rows == nullptr ? c.on.surfaces->list(m, g, o.rule, *made)
+                               : c.on.surfaces->list(m, g, o.rule, rows_of(rows, m), *made),
                counters);
         *list = made.release();
     });

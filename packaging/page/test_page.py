@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives the page that converts in Chromium, as a person does, and compares every file that it saves with the native tool's.
 
-usage: test_page.py CHROMIUM PAGE.html TOOL MODELS FOLDER [LARGE.glb]
+usage: test_page.py CHROMIUM PAGE.html TOOL MODELS FOLDER HASHES.wasm HASHES.txt [LARGE.glb]
 
 TOOL is the native tool, MODELS a folder with model.glb, model.obj and its .mtl, model.stl and model.ply (golden_hashes --write-model). FOLDER gets
-pictures of the page and report.txt. LARGE.glb is timed at 256 in colour.
+pictures of the page and report.txt. HASHES.wasm is the program of the library's golden hashes, which are compared with HASHES.txt. LARGE.glb is timed at 256 in colour.
 """
 
 import base64
 import io
+import json
 import pathlib
 import shutil
 import subprocess
@@ -191,6 +192,35 @@ def check_cancel(page, models):
     assert page.choose(models / "model.ply") == "done", page.message()
 
 
+def check_hashes(page, program, recorded, report):
+    """The library's golden hashes, computed by the browser."""
+    worker = (pathlib.Path(__file__).parent / "wasi.js").read_text(encoding="utf-8") + """
+onmessage = ({ data }) => {
+  const text = new TextDecoder();
+  let out = '', err = '';
+  const wasi = new Wasi({ args: ['golden_hashes', '--threads', '1'], print: bytes => { out += text.decode(bytes); }, say: bytes => { err += text.decode(bytes); } });
+  const code = wasi.run(new WebAssembly.Module(data));
+  postMessage(code === 0 ? out : `${code} ${err}`);
+};"""
+    body = page.browser
+    body.evaluate("document.body.append(Object.assign(document.createElement('input'), { type: 'file', id: 'program', hidden: true }))")
+    element = body.call("Runtime.evaluate", expression="document.getElementById('program')")["result"]["objectId"]
+    body.call("DOM.setFileInputFiles", files=[str(program.resolve())], objectId=element)
+    body.evaluate(f"""(() => {{
+      const worker = new Worker(URL.createObjectURL(new Blob([{json.dumps(worker)}], {{ type: 'text/javascript' }})));
+      worker.onmessage = ({{ data }}) => {{ document.body.dataset.hashes = data; worker.terminate(); }};
+      worker.onerror = e => {{ document.body.dataset.hashes = e.message; }};
+      document.getElementById('program').files[0].arrayBuffer().then(bytes => worker.postMessage(bytes));
+    }})()""")
+    body.wait_for("'hashes' in document.body.dataset", 1800)
+    printed = body.evaluate("document.body.dataset.hashes").split("\n")[:-1]
+    of_tool = ("file.", "model.", "coverage.tool.", "solid.tool.", "target.tool.", "cells.tool.")
+    expected = [line for line in recorded.read_text().splitlines() if line and not line.startswith(("#", *of_tool))]
+    equal = len(set(printed) & set(expected))
+    report(f"golden hashes of the library: {equal} of {len(expected)} equal")
+    assert sorted(printed) == sorted(expected) and equal >= 200, printed[:5]
+
+
 def check_sizes(page, models):
     """Desktop and telephone: nothing is wider than the window, and the voxels are drawn."""
     for name, (width, height) in (("desktop", DESKTOP), ("phone", PHONE)):
@@ -212,7 +242,7 @@ def check_sizes(page, models):
 
 
 def main():
-    chromium, page_file, tool, models, folder = sys.argv[1], *map(pathlib.Path, sys.argv[2:6])
+    chromium, page_file, tool, models, folder, hashes, recorded = sys.argv[1], *map(pathlib.Path, sys.argv[2:8])
     tool = tool.resolve()
     folder.mkdir(parents=True, exist_ok=True)
     lines = []
@@ -241,7 +271,8 @@ def main():
         check_cancel(page, models)
         check_large_text(page, tool, folder, report)
         check_sizes(page, models)
-        for large in map(pathlib.Path, sys.argv[6:]):
+        check_hashes(page, hashes, recorded, report)
+        for large in map(pathlib.Path, sys.argv[8:]):
             page.set(resolution=256, fill="", values="occupancy,color")
             assert page.choose(large) == "done", page.message()
             report(f"{large.name} at 256 in colour: {float(page.browser.evaluate('document.body.dataset.seconds')):.1f} s")

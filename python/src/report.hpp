@@ -105,15 +105,21 @@ template <class T>
     return options;
 }
 
+// Adds what closing holes has counted.
+template <class Counters>
+void report_holes(nb::dict& d, const Counters& counters) {
+    d["hole_edges"] = counters.hole_edges;
+    d["holes"] = counters.holes;
+    d["cones"] = counters.cones;
+}
+
 // report(), and the counters of solids.
 [[nodiscard]] inline nb::dict report_solid(const status& s) {
     nb::dict d = report(s);
     d["open_rows"] = s.solid.open_rows;
     d["crossings"] = s.solid.crossings;
     d["max_winding"] = s.solid.max_winding;
-    d["hole_edges"] = s.solid.hole_edges;
-    d["holes"] = s.solid.holes;
-    d["cones"] = s.solid.cones;
+    report_holes(d, s.solid);
     return d;
 }
 
@@ -126,9 +132,7 @@ template <class T>
     d["open_rows"] = s.cells.open_rows;
     d["open_edges"] = s.cells.open_edges;
     d["lost_centroids"] = s.cells.lost_centroids;
-    d["hole_edges"] = s.cells.hole_edges;
-    d["holes"] = s.cells.holes;
-    d["cones"] = s.cells.cones;
+    report_holes(d, s.cells);
     return d;
 }
 

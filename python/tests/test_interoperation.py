@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Meshes and arrays of other libraries. What is not installed is not tested, and shows as skipped."""
 
+import importlib.metadata
 import threading
 
 import numpy as np
@@ -14,6 +15,12 @@ from meshes import box, sphere
 def expected_of(mesh, n=24):
     grid = vp.fit(mesh, n)
     return grid, vp.voxelize(mesh, grid)
+
+
+def test_the_gpu_is_an_extra():
+    """voxelpipe[gpu] brings the package that draws on a GPU, and without the extra nothing does."""
+    names = [line for line in importlib.metadata.requires("voxelpipe") if line.startswith("voxelpipe-cuda13")]
+    assert len(names) == 1 and "extra ==" in names[0] and "gpu" in names[0]
 
 
 def test_trimesh(tmp_path):

@@ -78,6 +78,14 @@ struct ray_data {
     received_light* received;
     glm::vec3* mirrored;
     glm::vec3* moved; // of off_walls; null: cones start over their point
+
+    // Sets the place and the number of ray i of an order; false for numbers without a ray, and rays that meet nothing.
+    [[nodiscard]] VOXELPIPE_HD bool find(const ray_order& order, std::uint64_t i, bool by_phase, glm::ivec2& at,
+                                         std::size_t& ray) const {
+        if (!order.place(i, by_phase, at)) return false;
+        ray = order.index(at);
+        return near[ray].facing != 0;
+    }
 };
 
 struct see_points {
@@ -126,9 +134,8 @@ struct see_light {
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         glm::ivec2 at;
-        if (!order.place(i, false, at)) return;
-        const std::size_t ray = order.index(at);
-        if (data.near[ray].facing == 0) return;
+        std::size_t ray = 0;
+        if (!data.find(order, i, false, at, ray)) return;
         const glm::vec3 position = data.near[ray].position, normal = data.seen[ray].normal;
         const std::uint32_t noise =
             static_cast<std::uint32_t>(at.x) * 0x9e3779b9u ^ static_cast<std::uint32_t>(at.y) * 0x85ebca6bu;
@@ -157,9 +164,8 @@ struct find_walls {
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         glm::ivec2 at;
-        if (!order.place(i, false, at)) return;
-        const std::size_t ray = order.index(at);
-        if (data.near[ray].facing == 0) return;
+        std::size_t ray = 0;
+        if (!data.find(order, i, false, at, ray)) return;
         data.moved[ray] = off_walls(world, lists, data.near[ray].position, data.seen[ray].normal, pixel_cone_width);
     }
 };
@@ -174,9 +180,8 @@ struct receive_light {
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         glm::ivec2 at;
-        if (!order.place(i, true, at)) return;
-        const std::size_t ray = order.index(at);
-        if (data.near[ray].facing == 0) return;
+        std::size_t ray = 0;
+        if (!data.find(order, i, true, at, ray)) return;
         const cone_light around =
             gather(mips, world, cones, eye_rays::phase(at.x, at.y), data.near[ray].position, data.seen[ray].normal,
                    pixel_cone_width, data.moved != nullptr ? data.moved + ray : nullptr);
@@ -194,9 +199,8 @@ struct receive_mirrored {
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         glm::ivec2 at;
-        if (!order.place(i, false, at)) return;
-        const std::size_t ray = order.index(at);
-        if (data.near[ray].facing == 0) return;
+        std::size_t ray = 0;
+        if (!data.find(order, i, false, at, ray)) return;
         const seen_point& p = data.seen[ray];
         const surface s = world.at(p.triangle, {1.0f - p.y - p.z, p.y, p.z});
         if (!s.is_shiny()) return;

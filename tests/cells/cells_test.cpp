@@ -406,6 +406,11 @@ TEST(Cells, BadInput) {
     EXPECT_EQ(bad.code, vp::status_code::index_out_of_range);
     EXPECT_EQ(bad.triangle, m.triangles.size() - 1);
     EXPECT_EQ(vp::get<0>(fb).to_host(backend), before); // nothing is written
+    mesh no_vertices;
+    no_vertices.triangles = {{0, 1, 2}};
+    for (const vp::repair r : {vp::repair::none, vp::repair::close_holes})
+        EXPECT_EQ(draw(no_vertices, {.repair = r}).code, vp::status_code::index_out_of_range);
+    EXPECT_EQ(vp::get<0>(fb).to_host(backend), before);
     EXPECT_TRUE(draw({}, {}).ok());
     const std::vector<float> cleared = vp::get<0>(fb).to_host(backend);
     EXPECT_TRUE(std::all_of(cleared.begin(), cleared.end(), [](float f) { return f == 0.0f; }));
@@ -423,9 +428,13 @@ TEST(Cells, RowsWhoseSumsMightWrapAreRefused) {
                                   vp::fraction{}, fb, {.count_open_edges = false});
     };
     EXPECT_EQ(draw().code, vp::status_code::winding_too_large);
+    for (std::size_t i = 0; i < m.triangles.size(); i += 2) std::swap(m.triangles[i].x, m.triangles[i].y);
+    EXPECT_EQ(draw().code, vp::status_code::winding_too_large); // though nearly all cancel, as a block of them does
+    for (glm::uvec3& t : m.triangles) t = glm::uvec3(0, 1, 2);
     m.triangles.resize(m.triangles.size() - 2);
     const vp::status fits = draw();
     EXPECT_TRUE(fits.ok());
+    EXPECT_EQ(fits.cells.cell_records, m.triangles.size()); // blocks of them add up their terms first
     EXPECT_EQ(std::abs(fits.cells.volume()), static_cast<double>(m.triangles.size()) / 4);
 }
 

@@ -384,6 +384,10 @@ TEST(Links, BadInputWritesNothing) {
     const vp::status bad = vp::voxelize_links(backend, m.view(), g, vp::passthrough{}, list, {});
     EXPECT_EQ(bad.code, vp::status_code::index_out_of_range);
     EXPECT_EQ(bad.triangle, 12u);
+    mesh no_vertices;
+    no_vertices.triangles = {{0, 1, 2}};
+    EXPECT_EQ(vp::voxelize_links(backend, no_vertices.view(), g, vp::passthrough{}, list, {}).code,
+              vp::status_code::index_out_of_range);
     EXPECT_EQ(list.size(), records);
     EXPECT_EQ(list.neighbours, 26);
     // Dropped and outside.

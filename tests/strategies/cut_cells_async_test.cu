@@ -8,9 +8,12 @@
 
 #include <voxelpipe/cells/device/cells_async.cuh>
 
+#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace vp = voxelpipe;
@@ -111,14 +114,17 @@ TEST(DeviceCellsAsync, HaveTheBytesOfCallsThatWait) {
     }
 }
 
-// Captured once and replayed with vertices that move, to outside of the grid too.
-TEST(DeviceCellsAsync, GraphsFollowTheVertices) {
+namespace {
+
+// Captures a call with the mesh once, and replays it with each frame's positions: the bytes and counts of calls that
+// wait. Calls check(frame, status).
+template <class Check>
+void replay_frames(const mesh_data& m, const std::vector<std::vector<glm::vec3>>& frames, const Check& check) {
     cudaStream_t stream = nullptr;
     ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
     {
         vp::cuda_backend gpu{stream}; // frees its memory on the stream
         const vp::grid g = device_test::box_grid(glm::ivec3(20));
-        const mesh_data m = device_test::ball({9, 10, 9}, 5.4f, 6);
         std::vector<vp::mesh<vp::cuda_backend>> meshes;
         meshes.emplace_back(gpu, m.positions, m.triangles);
         const std::vector<async_draw> draws = draws_of(meshes);
@@ -128,12 +134,14 @@ TEST(DeviceCellsAsync, GraphsFollowTheVertices) {
         cudaGraph_t graph = nullptr;
         cudaGraphExec_t launchable = nullptr;
         ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
-        ASSERT_TRUE(run_async(gpu, draws, g, found, {}, room.view).ok());
-        ASSERT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
+        const vp::status captured = run_async(gpu, draws, g, found, {}, room.view);
+        ASSERT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess); // a stream that captures cannot free
+        ASSERT_TRUE(captured.ok()) << captured.message();
         ASSERT_EQ(cudaGraphInstantiate(&launchable, graph, 0), cudaSuccess);
-        for (int frame = 0; frame < 3; ++frame) {
-            std::vector<glm::vec3> moved = m.positions;
-            for (glm::vec3& p : moved) p += glm::vec3(frame == 1 ? 100.0f : 0.3f * static_cast<float>(frame));
+        for (std::size_t frame = 0; frame < frames.size(); ++frame) {
+            SCOPED_TRACE(frame);
+            const std::vector<glm::vec3>& moved = frames[frame];
+            ASSERT_EQ(moved.size(), m.positions.size());
             ASSERT_EQ(cudaMemcpy(const_cast<glm::vec3*>(meshes[0].view().positions.data()), moved.data(),
                                  moved.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice),
                       cudaSuccess);
@@ -143,13 +151,60 @@ TEST(DeviceCellsAsync, GraphsFollowTheVertices) {
             const vp::status expected = vp::voxelize_cells(gpu, draws, g, waited, {});
             EXPECT_EQ(s.counts, expected.counts);
             EXPECT_TRUE(s.cells == expected.cells);
-            EXPECT_EQ(s.counts.voxels == 0, frame == 1);
+            check(frame, s);
             expect_same_targets(gpu, waited, found);
         }
         EXPECT_EQ(cudaGraphExecDestroy(launchable), cudaSuccess);
         EXPECT_EQ(cudaGraphDestroy(graph), cudaSuccess);
     }
     EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
+}
+
+} // namespace
+
+// Captured once and replayed with vertices that move, to outside of the grid too.
+TEST(DeviceCellsAsync, GraphsFollowTheVertices) {
+    const mesh_data m = device_test::ball({9, 10, 9}, 5.4f, 6);
+    std::vector<std::vector<glm::vec3>> frames(3, m.positions);
+    for (glm::vec3& p : frames[1]) p += glm::vec3(100.0f);
+    for (glm::vec3& p : frames[2]) p += glm::vec3(0.6f);
+    replay_frames(m, frames,
+                  [](std::size_t frame, const vp::status& s) { EXPECT_EQ(s.counts.voxels == 0, frame == 1); });
+}
+
+// Vertices that triangles do not share: where they lie together the mesh is closed. They part, and meet again.
+TEST(DeviceCellsAsync, GraphsCountTheOpenEdgesOfEachFrame) {
+    const mesh_data shared = device_test::ball({9, 10, 9}, 5.4f, 6);
+    mesh_data m;
+    for (const glm::uvec3& t : shared.triangles) {
+        const auto first = static_cast<std::uint32_t>(m.positions.size());
+        for (int i = 0; i < 3; ++i) m.positions.push_back(shared.positions[t[i]]);
+        m.triangles.push_back({first, first + 1, first + 2});
+    }
+    const auto area = [&](std::size_t t) {
+        const glm::vec3* const p = &m.positions[3 * t];
+        return glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
+    };
+    std::size_t t = 0; // one that has three edges
+    while (area(t) < 0.5f) ++t;
+    std::vector<std::vector<glm::vec3>> frames(6, m.positions);
+    for (std::size_t i = 0; i < 3; ++i) frames[1][3 * t + i] += glm::vec3(0.25f); // leaves a hole
+    frames[2][3 * t] *= 1.125f;                                                   // two edges of it
+    for (std::size_t i = 0; i < m.positions.size(); ++i) {
+        frames[4][i] += static_cast<float>(i / 3 % 3); // all part
+        frames[5][i] += glm::vec3(2.0f, 0.0f, -1.0f);  // and meet, elsewhere
+    }
+    frames[4][0].y = std::numeric_limits<float>::quiet_NaN();
+    std::uint64_t most = 0;
+    replay_frames(m, frames, [&](std::size_t frame, const vp::status& s) {
+        constexpr std::uint64_t known[6] = {0, 6, 4, 0, 0, 0};
+        if (frame == 4)
+            most = s.cells.open_edges;
+        else
+            EXPECT_EQ(s.cells.open_edges, known[frame]);
+        EXPECT_EQ(s.counts.triangles_nonfinite, frame == 4 ? 1u : 0u);
+    });
+    EXPECT_GT(most, 100u);
 }
 
 TEST(DeviceCellsAsync, BadInputAndWhatItCannotDo) {

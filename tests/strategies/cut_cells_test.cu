@@ -353,5 +353,7 @@ TEST(DeviceCells, NothingAndBadIndices) {
     mesh_data m = device_test::ball({2, 2, 2}, 1.5f, 4);
     m.triangles.push_back({0, 1, 1000000});
     EXPECT_EQ(draw(gpu, {m}, g, vp::fraction{}, fb, {}).code, vp::status_code::index_out_of_range);
+    m.positions.clear();
+    EXPECT_EQ(draw(gpu, {m}, g, vp::fraction{}, fb, {}).code, vp::status_code::index_out_of_range);
     for (const float f : vp::get<0>(fb).to_host(gpu)) EXPECT_EQ(f, 0.0f);
 }

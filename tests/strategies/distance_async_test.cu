@@ -5,7 +5,11 @@
 // and what it says of room that is too small and of bad input, which leave every target as it was.
 #include "distance_drawings.hpp"
 
+#include "../programs/module_cases.hpp"
+
 #include <voxelpipe/distance/device/distance_async.cuh>
+#include <voxelpipe/distance/device/sparse_distance_async.cuh>
+#include <voxelpipe/programs/device/distance_program_async.cuh>
 
 #include <gtest/gtest.h>
 
@@ -204,4 +208,203 @@ TEST(DeviceDistanceAsync, BadInputAndWhatItCannotDo) {
     expect_same_status(vp::voxelize_distance(gpu, async_draws(empty), g, waited, {}),
                        vp::read_distance_status(gpu, room.view));
     expect_same_targets(gpu, waited, fb);
+}
+
+namespace {
+
+using program_targets = programs::distance_targets<vp::cuda_backend>;
+
+// Draws what programs make without waits, from no room at all, and compares with the call that waits.
+template <class Amplify>
+void expect_same_programs(vp::cuda_backend& gpu, const std::vector<vp::mesh_view<>>& meshes, const vp::grid& g,
+                          const Amplify& amplify, const vp::distance_options& o) {
+    using draw_type = vp::draw<vp::mesh_view<>, programs::weighted, programs::numbers_of_distance, Amplify>;
+    std::vector<draw_type> draws;
+    for (const auto& m : meshes) draws.push_back({m, {}, amplify, {}});
+    const std::span<const draw_type> all(draws);
+    program_targets waited(gpu, g.extent), found(gpu, g.extent);
+    const vp::status expected = vp::voxelize_distance(gpu, all, g, waited, o);
+    ASSERT_TRUE(expected.ok()) << expected.message();
+    ASSERT_TRUE(vp::clear(gpu, found).ok());
+    const auto before = vp::get<0>(found).to_host(gpu);
+    vp::distance_program_limits limits;
+    const auto run = [&](const vp::distance_program_limits& l, vp::distance_program_limits* need) {
+        vp::cuda_backend::buffer<std::uint8_t> memory(gpu, vp::distance_workspace_bytes(all, g, found.view(), o, l));
+        EXPECT_NE(memory.size(), 0u);
+        EXPECT_EQ(cudaMemsetAsync(memory.data(), 0xa5, memory.size(), gpu.stream), cudaSuccess);
+        const vp::distance_program_workspace_view w{memory.data(), memory.size(), l};
+        const vp::status launched = vp::voxelize_distance_async(gpu, all, g, found.view(), o, w);
+        return launched.ok() ? vp::read_distance_status(gpu, w, need) : launched;
+    };
+    const auto expect_same = [&](const vp::status& s) {
+        expect_same_status(expected, s);
+        vp::core::for_each_index<3>([&]<std::size_t I>() {
+            device_test::expect_same_bytes(vp::get<I>(waited).to_host(gpu), vp::get<I>(found).to_host(gpu), "target");
+        });
+    };
+    int failures = 0;
+    for (vp::status s = run(limits, &limits); !s.ok(); s = run(limits, &limits)) {
+        ASSERT_EQ(s.code, vp::status_code::capacity_exceeded) << s.message();
+        ASSERT_EQ(vp::get<0>(found).to_host(gpu), before);
+        ASSERT_LT(++failures, 8);
+    }
+    EXPECT_GE(failures, o.band.is_whole ? 1 : 2); // the programs, and the pairs of a band behind them
+    expect_same(run(limits, nullptr));
+    vp::distance_program_limits spare = limits;
+    spare.triangles += 77; // of each draw: the primitives of later ones move
+    spare.pairs += 500;
+    expect_same(run(spare, nullptr));
+}
+
+} // namespace
+
+// Draws of several meshes with each kind of program, in bands and whole fields, with and without a sign: the triangles
+// for which there is room and which no program makes have no distance, and no number.
+TEST(DeviceDistanceAsync, ProgramsHaveTheBytesOfCallsThatWait) {
+    vp::cuda_backend gpu;
+    vp::grid g;
+    g.extent = {20, 17, 22};
+    programs::octahedra one, two;
+    one.add({9.25f, 8.5f, 8.0f}, 5.75f);
+    two.add({7.5f, 9.0f, 15.0f}, 3.5f);
+    const vp::mesh<vp::cuda_backend> a(gpu, one.positions, one.triangles), b(gpu, two.positions, two.triangles);
+    const vp::geometry doubled{programs::doubled{{1.5f, 0.25f, 7.0f}}};
+    const std::vector<vp::mesh_view<>> both{a.view(), b.view()};
+    expect_same_programs(gpu, both, g, doubled, {.band = 2.5});
+    expect_same_programs(gpu, both, g, doubled, {.band = vp::band::whole, .sign = vp::distance_sign::none});
+    expect_same_programs(gpu, both, g, vp::tessellate{programs::divided{9}}, {});
+    expect_same_programs(gpu, {a.view()}, g, vp::tessellate{programs::divided{10}} | doubled, {.band = 1.5});
+}
+
+// What a call of programs is refused for.
+TEST(DeviceDistanceAsync, ProgramsThatCannotBeDrawn) {
+    vp::cuda_backend gpu;
+    vp::grid g;
+    g.extent = {12, 12, 12};
+    programs::octahedra one;
+    one.add({6, 6, 6}, 4);
+    const vp::mesh<vp::cuda_backend> m(gpu, one.positions, one.triangles);
+    const vp::geometry amplify{programs::doubled{{1, 0, 2}}};
+    using draw_type = vp::draw<vp::mesh_view<>, programs::weighted, programs::numbers_of_distance,
+                               std::remove_cv_t<decltype(amplify)>>;
+    const draw_type d{m.view(), {}, amplify, {}};
+    const std::span<const draw_type> draws(&d, 1);
+    program_targets fb(gpu, g.extent);
+    const auto limits = vp::distance_program_limits::for_triangles(100);
+    const auto code = [&](const vp::distance_options& o, const vp::distance_program_limits& l) {
+        return vp::voxelize_distance_async(gpu, draws, g, fb.view(), o, {nullptr, 0, l}).code;
+    };
+    EXPECT_EQ(code({}, limits), vp::status_code::capacity_exceeded);
+    EXPECT_EQ(code({.repair = vp::repair::close_holes}, limits), vp::status_code::strategy_unavailable);
+    EXPECT_EQ(code({.band = -1}, limits), vp::status_code::bad_distance_options);
+    vp::distance_program_limits many = limits;
+    many.triangles = std::uint64_t{1} << 40;
+    EXPECT_EQ(code({}, many), vp::status_code::size_overflow);
+    many = limits;
+    many.pairs = std::uint64_t{1} << 33;
+    EXPECT_EQ(code({}, many), vp::status_code::size_overflow);
+}
+
+namespace {
+
+using sparse_draw = vp::draw<vp::mesh_view<>, vp::passthrough, sparse_shader>;
+using bricks_result = vp::sparse_result<vp::target<float, vp::blend::add>, vp::target<std::uint32_t, vp::blend::max>,
+                                        vp::target<vp::bit, vp::blend::bit_or>>;
+using bricks_framebuffer =
+    vp::sparse_framebuffer<vp::cuda_backend, vp::target<float, vp::blend::add>,
+                           vp::target<std::uint32_t, vp::blend::max>, vp::target<vp::bit, vp::blend::bit_or>>;
+
+template <class Host>
+void expect_same_host(const Host& x, const Host& y) {
+    device_test::expect_same_bytes(x.keys, y.keys, "keys");
+    device_test::expect_same_bytes(x.masks, y.masks, "masks");
+    device_test::expect_same_bytes(x.offsets, y.offsets, "offsets");
+    vp::core::for_each_index<3>(
+        [&]<std::size_t I>() { device_test::expect_same_bytes(vp::get<I>(x.values), vp::get<I>(y.values), "values"); });
+}
+
+} // namespace
+
+// Bricks in the caller's memory, from no room at all: those of the call that waits, with a discard; at corners, of a
+// part of a grid, without a sign, of a whole field; and once more on top of what the first call left.
+TEST(DeviceDistanceAsync, BricksAreThoseOfCallsThatWait) {
+    vp::cuda_backend gpu;
+    mesh_data bodies = device_test::tied_bodies(25, 3, 2);
+    append(bodies, device_test::ball({17, 9, 14}, 6.3f, 6));
+    const vp::mesh<vp::cuda_backend> mesh(gpu, bodies.positions, bodies.triangles);
+    const sparse_draw d{mesh.view(), {}, {}};
+    const std::span<const sparse_draw> draws(&d, 1);
+    const vp::grid whole = unit_grid({43, 26, 21});
+    for (const vp::distance_options& o :
+         {vp::distance_options{.band = 2}, vp::distance_options{.band = 1.5, .sample = vp::sample::corner},
+          vp::distance_options{.sign = vp::distance_sign::none},
+          vp::distance_options{.band = vp::band::whole, .rule = vp::fill_rule::even_odd, .count_voxels = false}}) {
+        const vp::grid g = o.sample == vp::sample::corner ? whole.crop({3, 5, 2}, {37, 19, 17})
+                           : o.band.is_whole              ? whole.crop({9, 4, 5}, {15, 14, 11})
+                                                          : whole;
+        bricks_framebuffer waited(gpu, vp::core::sample_grid(g, o.sample).extent);
+        bricks_result result;
+        vp::sparse_distance_limits limits;
+        limits.nodes = 4;
+        int failures = 0;
+        std::vector<vp::cuda_backend::buffer<std::uint8_t>> kept; // what the first call left stays in its own memory
+        for (const bool again : {false, true}) {
+            const vp::status expected = vp::voxelize_distance(gpu, draws, g, waited, o);
+            ASSERT_TRUE(expected.ok()) << expected.message();
+            bricks_result next;
+            if (again) next.load(result);
+            for (;;) {
+                ASSERT_LT(failures, 16);
+                const std::size_t bytes = vp::distance_workspace_bytes(draws, g, next, o, limits);
+                ASSERT_NE(bytes, 0u);
+                kept.emplace_back(gpu, bytes);
+                ASSERT_EQ(cudaMemsetAsync(kept.back().data(), 0xa5, bytes, gpu.stream), cudaSuccess);
+                const vp::sparse_distance_workspace_view w{kept.back().data(), bytes, limits};
+                ASSERT_TRUE(vp::voxelize_distance_async(gpu, draws, g, next, o, w).ok());
+                const vp::status s = vp::read_distance_status(gpu, w, &limits);
+                if (s.ok()) {
+                    expect_same_status(expected, s);
+                    break;
+                }
+                ++failures;
+                ASSERT_EQ(s.code, vp::status_code::capacity_exceeded) << s.message();
+                ASSERT_EQ(next.to_host(gpu).num_voxels(), 0u);
+            }
+            result = next;
+            const auto x = waited.to_host(gpu);
+            EXPECT_GT(x.num_voxels(), 100u);
+            expect_same_host(x, result.to_host(gpu));
+            if (!again) vp::core::for_each_index<3>([&]<std::size_t I>() { vp::get<I>(waited).load(); });
+        }
+        EXPECT_GE(failures, 2);
+    }
+}
+
+TEST(DeviceDistanceAsync, BricksWithoutTrianglesAndWhatIsRefused) {
+    vp::cuda_backend gpu;
+    const vp::grid g = unit_grid(glm::ivec3(12));
+    const mesh_data m = device_test::ball({6, 6, 6}, 4.4f, 5);
+    const vp::mesh<vp::cuda_backend> full(gpu, m.positions, m.triangles),
+        empty(gpu, std::vector<glm::vec3>{}, std::vector<glm::uvec3>{});
+    const sparse_draw d{full.view(), {}, {}}, none{empty.view(), {}, {}};
+    const auto limits = vp::sparse_distance_limits::for_triangles(500);
+    bricks_result result;
+    const auto run = [&](const sparse_draw& drawn, const vp::distance_options& o,
+                         const vp::sparse_distance_workspace_view& w) {
+        return vp::voxelize_distance_async(gpu, std::span<const sparse_draw>(&drawn, 1), g, result, o, w).code;
+    };
+    const std::size_t bytes =
+        vp::distance_workspace_bytes(std::span<const sparse_draw>(&d, 1), g, result, vp::distance_options{}, limits);
+    vp::cuda_backend::buffer<std::uint8_t> memory(gpu, bytes);
+    const vp::sparse_distance_workspace_view room{memory.data(), bytes, limits};
+    EXPECT_EQ(run(none, {}, room), vp::status_code::ok);
+    const vp::status s = vp::read_distance_status(gpu, room);
+    EXPECT_TRUE(s.ok()) << s.message();
+    EXPECT_EQ(result.to_host(gpu).num_voxels(), 0u);
+    EXPECT_EQ(run(d, {.repair = vp::repair::winding}, room), vp::status_code::strategy_unavailable);
+    EXPECT_EQ(run(d, {.band = -1}, room), vp::status_code::bad_distance_options);
+    EXPECT_EQ(run(d, {}, {memory.data(), bytes - 1, limits}), vp::status_code::capacity_exceeded);
+    vp::sparse_distance_limits many = limits;
+    many.voxels = std::uint64_t{1} << 33;
+    EXPECT_EQ(run(d, {}, {memory.data(), bytes, many}), vp::status_code::size_overflow);
 }

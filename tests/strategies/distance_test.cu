@@ -7,6 +7,7 @@
 
 #include "../programs/module_cases.hpp"
 
+#include <voxelpipe/distance/distance_ray.hpp>
 #include <voxelpipe/slabs/devices.cuh>
 #include <voxelpipe/slabs/stream.hpp>
 
@@ -235,4 +236,59 @@ TEST(DeviceDistance, PointsHaveTheBytesOfTheCpu) {
           vp::distance_options{.rule = vp::fill_rule::even_odd}})
         expect_same_points(meshes, unit_grid(extent), 300, o);
     expect_same_points({mesh_data{}}, unit_grid(extent), 10, {});
+}
+
+namespace {
+
+// Ray i from the border towards the middle of the field, its hit, and value and gradient half way there.
+struct follow_ray {
+    vp::distance_samples field;
+    glm::dvec3 middle;
+    vp::distance_hit* hits;
+    glm::vec4* read;
+
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        glm::dvec3 way(static_cast<double>(i % 7) - 3.0, static_cast<double>(i / 7 % 5) - 2.1,
+                       static_cast<double>(i / 35) - 4.3);
+        const double length = vp::exact::sqrt(way.x * way.x + way.y * way.y + way.z * way.z);
+        way = glm::dvec3(vp::exact::div(way.x, length), vp::exact::div(way.y, length), vp::exact::div(way.z, length));
+        const glm::dvec3 from = middle - glm::dvec3(way.x * 30.0, way.y * 30.0, way.z * 30.0);
+        hits[i] = vp::trace(field, from, way, 60.0, i % 3 == 0 ? 1.25f : 0.0f);
+        const glm::dvec3 at(vp::exact::fma(way.x, 3.7, middle.x), vp::exact::fma(way.y, 3.7, middle.y),
+                            vp::exact::fma(way.z, 3.7, middle.z));
+        const glm::vec3 g = field.gradient(at);
+        read[i] = {field(at), g.x, g.y, g.z};
+    }
+};
+
+} // namespace
+
+// Rays and gradients of a field in the backend's memory: the same bits in a kernel.
+TEST(DeviceDistance, RaysMeetTheFieldWhereTheyDoOnTheHost) {
+    constexpr std::uint64_t rays = 350;
+    const vp::grid g = unit_grid({22, 20, 19});
+    const mesh_data m = device_test::ball({11, 9, 9}, 5.3f, 9);
+    const auto follow = [&](auto& be) {
+        using backend = std::remove_cvref_t<decltype(be)>;
+        one_target<backend> fb(be, g.extent);
+        EXPECT_TRUE(draw(be, {m}, g, vp::distance{}, fb, {}, false).ok());
+        typename backend::template buffer<vp::distance_hit> hits(be, rays);
+        typename backend::template buffer<glm::vec4> read(be, rays);
+        be.for_each(rays,
+                    follow_ray{vp::samples_of(vp::get<0>(fb).view(), g), {10.9, 9.1, 9.2}, hits.data(), read.data()});
+        return std::pair(hits.to_host(be), read.to_host(be));
+    };
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    const auto here = follow(cpu), there = follow(gpu);
+    std::size_t met = 0;
+    for (std::size_t i = 0; i < rays; ++i) {
+        const vp::distance_hit &a = here.first[i], &b = there.first[i];
+        met += a.hit ? 1 : 0;
+        ASSERT_EQ(a.hit, b.hit) << i;
+        ASSERT_EQ(a.t, b.t) << i;
+        ASSERT_EQ(a.gradient, b.gradient) << i;
+    }
+    EXPECT_GT(met, rays * 9 / 10);
+    device_test::expect_same_bytes(here.second, there.second, "values and gradients");
 }

@@ -4,6 +4,7 @@
 #include "fraction_support.hpp"
 
 #include <cpu_ref/backend.hpp>
+#include <voxelpipe/sparse/io/nanovdb_layout.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
 #include <gtest/gtest.h>
@@ -53,6 +54,34 @@ TEST(Fraction, NpyHasTheBytesOfTheLibrary) {
         ASSERT_EQ((std::vector<std::size_t>{16, 16, 16}), found.shape);
         expect_same(library_fractions({tilted}, grid_of_16()), found);
     }
+}
+
+// Arrays are indexed by z, y and x; faces across an axis are one more along it.
+TEST(Fraction, NpyIsIndexedByZYAndX) {
+    const scratch_folder folder;
+    builder file;
+    add(file, box({-4, -3.75F, -3.5F}, {-3.5F, -2.75F, -1.75F}));
+    file.write_glb(folder / "m.glb");
+    const auto shape_of = [&](const std::string& wanted) {
+        const outcome result = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "--origin", "-4,-4,-4", "-s",
+                                            "0.5", "--extent", "3,5,7", "-t", wanted});
+        EXPECT_EQ(0, result.code) << result.err;
+        EXPECT_EQ("<f4", read_npy(folder / "o.npy").type);
+        return read_npy(folder / "o.npy").shape;
+    };
+    using shape_type = std::vector<std::size_t>;
+    EXPECT_EQ((shape_type{7, 5, 4}), shape_of("aperture_x"));
+    EXPECT_EQ((shape_type{7, 6, 3}), shape_of("aperture_y"));
+    EXPECT_EQ((shape_type{8, 5, 3}), shape_of("aperture_z"));
+    EXPECT_EQ((shape_type{7, 5, 3}), shape_of("fraction"));
+    const array found = read_npy(folder / "o.npy");
+    const auto at = [&](std::size_t z, std::size_t y, std::size_t x) { return found.at<float>((z * 5 + y) * 3 + x); };
+    EXPECT_EQ(0.5F, at(1, 0, 0));
+    EXPECT_EQ(1.0F, at(1, 1, 0));
+    EXPECT_EQ(0.5F, at(4, 1, 0));
+    EXPECT_EQ(0.25F, at(4, 2, 0));
+    EXPECT_EQ(0.0F, at(1, 1, 1));
+    EXPECT_EQ(0.0F, at(5, 1, 0));
 }
 
 TEST(Fraction, OfABoxIsTheProductOfItsOverlaps) {
@@ -286,8 +315,25 @@ TEST(Fraction, EveryFormatOfValuesHoldsIt) {
         EXPECT_EQ(0, result.code) << output << ": " << result.err;
         EXPECT_EQ(std::string::npos, result.err.find("warning")) << output << ": " << result.err;
     }
-    const outcome result = draw(folder, file, "o.nvdb", {"-t", "fraction", "--solid", "nonzero"});
-    EXPECT_EQ(0, result.code) << result.err;
+    for (const std::vector<std::string>& arguments :
+         {std::vector<std::string>{"-t", "fraction", "--solid", "nonzero"}, {"-t", "fraction", "--sparse"}}) {
+        const outcome result = draw(folder, file, "o.nvdb", arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+        const std::string bytes = read_file(folder / "o.nvdb");
+        std::vector<std::string> fog; // the grids of that class, of the headers of all grids in front
+        vp::io::nanovdb::file_header header{};
+        ASSERT_GE(bytes.size(), sizeof(header));
+        std::memcpy(&header, bytes.data(), sizeof(header));
+        for (std::size_t i = 0, at = sizeof(header); i < header.num_grids; ++i) {
+            vp::io::nanovdb::file_entry entry{};
+            ASSERT_GE(bytes.size(), at + sizeof(entry));
+            std::memcpy(&entry, bytes.data() + at, sizeof(entry));
+            at += sizeof(entry);
+            if (entry.meaning == vp::io::nanovdb::grid_class::fog_volume) fog.emplace_back(bytes.data() + at);
+            at += entry.name_size;
+        }
+        EXPECT_EQ(std::vector<std::string>{"fraction"}, fog);
+    }
 }
 
 std::size_t cells_of(const std::string& vtu) {

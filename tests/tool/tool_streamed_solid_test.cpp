@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-// Floods and votes of models that do not fit --max-memory, whose slabs depend on each other: the same voxels, values
-// and counts as of a run that holds the model.
+// Floods and votes of models that do not fit --max-memory, whose slabs depend on each other, and distances, whose slabs
+// need triangles beyond them: the same voxels, values and counts as of a run that holds the model.
 #include "gltf_builder.hpp"
 #include "two_ways.hpp"
 
@@ -217,6 +217,51 @@ TEST(StreamedSolids, GridsThatDoNotFit) {
         for (const char* const name : {"triangles", "fragments", "voxels"})
             EXPECT_EQ(a.value(name, -1), b.value(name, -2)) << name;
         EXPECT_EQ(a["solid"], b["solid"]);
+    }
+}
+
+// The field piece by piece: in a band, without a sign, with values of the nearest triangle, and by each repair that
+// slabs know.
+TEST(StreamedDistances, AreThoseOfTheModelThatIsHeld) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    write_ball(folder / "m.ply", 0);
+    two_ways{folder, folder / "m.ply", {"-r", "60", "--padding", "4", "--distance"}}.expect_equal(60, {});
+    two_ways{folder,
+             folder / "m.ply",
+             {"-r", "40", "--distance", "--unsigned", "--band", "1.5", "-t",
+              "distance,nearest,color,normal,material,triangle,depth"}}
+        .expect_equal(60, {});
+    write_ball(folder / "m.ply", 16);
+    // The model leaves the grid: slabs without triangles, and rows that only triangles beside the grid cross.
+    for (const char* const repair : {"--close-holes", "--winding"})
+        two_ways{folder,
+                 folder / "m.ply",
+                 {"--voxel-size", "0.02", "--origin", "0.3,0.1,-0.4", "--extent", "30,50,70", "--distance", repair}}
+            .expect_equal(60, {});
+    const two_ways open{folder, folder / "m.ply", {"-r", "40", "--distance", "--solid", "positive"}};
+    open.expect_equal(60, {});
+    EXPECT_NE(std::string::npos, open.draw_streamed(60).err.find("the sign of --distance: the model is not closed"));
+}
+
+// A level set has the field in memory, and what is not decided slab by slab needs the model there.
+TEST(StreamedDistances, WholeFieldsInMemoryAndWhatNeedsTheModel) {
+    if (sanitized) return;
+    const scratch_folder folder;
+    write_ball(folder / "m.ply", 0);
+    const two_ways values{folder, folder / "m.ply", {"-r", "60", "--padding", "4", "--distance"}};
+    const outcome tight = values.draw("tight.nvdb", {"--max-memory", "60"}), free = values.draw("free.nvdb");
+    ASSERT_EQ(0, tight.code) << tight.err;
+    ASSERT_EQ(0, free.code) << free.err;
+    EXPECT_NE(std::string::npos, tight.err.find(" triangles do not fit")) << tight.err;
+    EXPECT_TRUE(read_file(folder / "tight.nvdb") == read_file(folder / "free.nvdb"));
+    for (const std::vector<std::string>& more :
+         {std::vector<std::string>{"--band", "whole"}, {"--corners"}, {"--vote"}, {"--solid", "exterior"}}) {
+        std::vector<std::string> all = more;
+        all.insert(all.end(), {"--max-memory", "44"});
+        const outcome refused = values.draw("no.npz", all);
+        EXPECT_EQ(3, refused.code) << more[0] << refused.err;
+        EXPECT_NE(std::string::npos, refused.err.find(" MiB are needed")) << refused.err;
     }
 }
 

@@ -263,6 +263,11 @@ TEST(Streamed, Textures) {
     file.write_glb(folder / "m.glb");
     two_ways{folder, folder / "m.glb", {"-r", "128", "-t", "occupancy,color,color-max,color-replace,color-outer"}}
         .expect_equal(textured_memory);
+    // Those of the nearest triangles, each draw with a sign of its own.
+    two_ways{folder,
+             folder / "m.glb",
+             {"-r", "64", "--distance", "--solid", "each_draw", "-t", "distance,nearest,color,material"}}
+        .expect_equal(textured_memory, {});
     // Nobody asks for colours, but the mask cuts fragments off.
     two_ways{folder, folder / "m.glb", {"-r", "128", "-t", "count,material"}}.expect_equal(world_memory);
     // Another format, dense against slab by slab.

@@ -43,14 +43,14 @@ struct two_ways {
     }
 
     // The same, and into free.npz with the model in memory: the files are equal, and so are the statistics but for
-    // memory, slabs and times.
-    void expect_equal(int mebibytes) const {
+    // memory, slabs and times. held: options of the run that holds the model.
+    void expect_equal(int mebibytes, const std::vector<std::string>& held = {"--sparse"}) const {
         std::string text;
         for (const std::string& word : how) text += word + ' ';
         SCOPED_TRACE(text);
         const outcome tight = draw_streamed(mebibytes);
         if (tight.code != 0) return;
-        const outcome free = draw("free.npz", {"--sparse"});
+        const outcome free = draw("free.npz", held);
         ASSERT_EQ(0, free.code) << free.err;
         EXPECT_EQ(std::string::npos, free.err.find(" triangles do not fit")) << free.err;
         EXPECT_TRUE(read_file(folder / "free.npz") == read_file(folder / "tight.npz"));

@@ -175,5 +175,14 @@ says out.txt "0 done, 2 were finished, 1 failed"
 printf 'model.obj\n' | "${runner[@]}" "$tool" --list - -o 'all\{name}.ply' -r 8 >out.txt 2>err.txt
 says out.txt "1 done"
 
+# A path of more than 260 characters, which Windows takes from programs whose manifest says that they know such.
+holds grep -q '<longPathAware .*>true</longPathAware>' "$tool"
+deep=$(printf 'a folder of thirty characters.%d/' {0..9})
+mkdir -p "$deep"
+cp model.mtl "$deep"
+cp model.obj "$deep/model.obj"
+run 0 "$deep/model.obj" -o "$deep/model.npz" "${colors[@]}"
+holds cmp plain.npz "$deep/model.npz"
+
 [[ $failures -eq 0 ]] || { printf '%d failures\n' "$failures"; exit 1; }
 printf 'the tool for Windows: all passed\n'

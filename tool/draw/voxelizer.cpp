@@ -56,7 +56,7 @@ double fraction_bytes(const voxelize_request& request, double vertices, double t
     if (!request.wants_cells()) return 0;
     const glm::dvec3 n(request.grid.extent);
     constexpr double triangle_bytes = 36, edges_bytes = 72;
-    const double pair_bytes = request.wants(target::area) || request.wants(target::centroid) ? 128 : 56;
+    const double pair_bytes = request.wants(target::area) || request.wants(target::centroid) ? 208 : 64;
     const double pairs = 2 * triangles + 2.5 * (n.x * n.y + n.y * n.z + n.z * n.x);
     const double holes = request.close_holes != 0 ? 40 * vertices + 36 * triangles : 0; // on the host
     const double scratch = request.wants(target::fraction) ? 0 : sizeof(float) * n.x * n.y * n.z;

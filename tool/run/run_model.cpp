@@ -338,7 +338,9 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     report.request.progress = [&bar](double done) { bar.show(done); };
     volume voxels;
     sparse_volume bricks;
-    if (stream)
+    if (stream && report.request.distance)
+        voxels = run_streamed_distances(*stream, place, report.request, report.stats);
+    else if (stream)
         bricks = run_streamed_voxelizer(*stream, place, report.request, report.stats);
     else if (storage.sparse)
         bricks = run_sparse_voxelizer(std::move(model), report.request, place.folder, report.stats);
@@ -400,9 +402,10 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
 opened_stream streamed_input(const command_line& options, const std::filesystem::path& folder, double loaded_room) {
     const voxelize_request& request = options.voxelize;
     const bool needs_dense = request.wants_cells() || (request.solid && request.solid->fill == solid_fill::nearest);
-    const bool is_drawn_here =
-        !request.distance && !request.remesh && !needs_dense && request.backend != backend_choice::cuda &&
-        request.strategy == voxelpipe::strategy::automatic && options.storage != storage_choice::dense;
+    const bool is_drawn_here = (!request.distance || streams_distances(request)) && !request.remesh && !needs_dense &&
+                               request.backend != backend_choice::cuda &&
+                               request.strategy == voxelpipe::strategy::automatic &&
+                               options.storage != storage_choice::dense;
     if (!is_drawn_here) return {};
     return open_stream(options.input, {memory::room() / 8, loaded_room}, folder, options.load);
 }

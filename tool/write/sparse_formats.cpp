@@ -117,11 +117,13 @@ void add_grid(nanovdb_file& file, const sparse_volume& v, const channel& c, cons
     for (std::size_t at = 0; at < sizeof(T); at += sizeof(empty))
         std::memcpy(reinterpret_cast<std::byte*>(&background) + at, &empty, sizeof(empty));
     const std::byte* const data = c.data.data();
-    file.add<T>({name, table, grid_of(v.shape), background, [data, rank_of](std::uint64_t rank) {
-                     T value;
-                     std::memcpy(&value, data + rank_of(rank) * sizeof(T), sizeof(T));
-                     return value;
-                 }});
+    nanovdb::source<T> grid{name, table, grid_of(v.shape), background, [data, rank_of](std::uint64_t rank) {
+                                T value;
+                                std::memcpy(&value, data + rank_of(rank) * sizeof(T), sizeof(T));
+                                return value;
+                            }};
+    if (is_fog(c)) grid.meaning = nanovdb::grid_class::fog_volume;
+    file.add<T>(std::move(grid));
 }
 
 template <class RankOf>

@@ -17,6 +17,11 @@
 
 namespace voxelize {
 
+// True of a channel whose grid states the class of fog, in .vdb and .nvdb: how much of each voxel is inside.
+[[nodiscard]] inline bool is_fog(const channel& c) {
+    return c.name == "fraction" && c.type == scalar::f32 && c.components == 1;
+}
+
 // Formats that hold occupied voxels alone.
 [[nodiscard]] bool is_sparse_format(const std::filesystem::path& path);
 // As write() of formats.hpp, for a sparse volume.

@@ -5,6 +5,7 @@
 #include "model/srgb.hpp"
 #include "write/formats/output_file.hpp"
 #include "write/formats/progress.hpp"
+#include "write/sparse_formats.hpp"
 
 #include <voxelpipe/sparse/host_sparse.hpp>
 
@@ -189,6 +190,7 @@ openvdb::GridPtrVec grids_of(const sparse_volume& v, const std::filesystem::path
         } else if (c.type == scalar::f32 && c.components == 1) {
             grids.push_back(
                 make_grid<openvdb::FloatGrid>(v, c.name, voxelpipe::core::bit_cast<float>(empty), values_of<float>(c)));
+            if (is_fog(c)) grids.back()->setGridClass(openvdb::GRID_FOG_VOLUME);
         } else if (c.type == scalar::f32 && c.components == 3) {
             grids.push_back(
                 make_grid<openvdb::Vec3SGrid>(v, c.name, openvdb::Vec3s(0.0F), values_of<openvdb::Vec3s>(c)));

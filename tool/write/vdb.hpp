@@ -4,8 +4,8 @@
 
 // Sparse volumes as .vdb, by OpenVDB; only in builds that have it. A grid for each channel: the occupancy as a mask,
 // counts as 32-bit integers (64 bits where one needs them), colours as vectors of linear light with their alpha as a
-// grid NAME.alpha where any is not 1, everything else as it is. Voxel centres lie at integer coordinates, as OpenVDB
-// has them. The same volume gives the same bytes.
+// grid NAME.alpha where any is not 1, fractions as fog, everything else as it is. Voxel centres lie at integer
+// coordinates, as OpenVDB has them. The same volume gives the same bytes.
 
 #include "model/sparse_volume.hpp"
 #include "write/formats/formats.hpp"

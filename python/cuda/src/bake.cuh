@@ -10,8 +10,6 @@
 
 namespace voxelpipe::python {
 
-using namespace bindings; // what all bindings share
-
 template <class T, int Components>
 [[nodiscard]] counted_value_shader<T, Components> shader_of(const mesh_view<>& mesh, const device_values<T>& v) {
     return {{v.values + v.first, v.columns, v.count, v.per_triangle ? nullptr : mesh.triangles.data()}};

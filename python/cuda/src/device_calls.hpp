@@ -5,6 +5,7 @@
 // The calls of the module for GPUs, without CUDA or Python: what nvcc compiles on one side and the bindings on the
 // other. All arrays are in the device's memory, and the caller's. Every call waits for its stream at its end.
 
+#include <bindings/device_stream.hpp>
 #include <voxelpipe/solid/solid.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
@@ -15,11 +16,7 @@
 
 namespace voxelpipe::python {
 
-// The device and stream of a call. The stream is the caller's.
-struct device_stream {
-    int device = 0;
-    std::uintptr_t stream = 0; // a cudaStream_t
-};
+using bindings::device_stream;
 
 // The fold of a voxel's fragments. A mean is a sum that is divided.
 enum class combine : std::uint8_t { mean, sum, min, max, last };

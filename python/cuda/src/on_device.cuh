@@ -2,44 +2,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The backend of a call, and kernels that copy results into the caller's arrays.
+// Kernels that copy results into the caller's arrays.
 
 #include "device_calls.hpp"
 
-#include <cuda_runtime.h>
+#include <bindings/device_call.cuh>
 
-#include <stdexcept>
-#include <string>
+#include <cuda_runtime.h>
 
 namespace voxelpipe::python {
 
-inline void check(cudaError_t error) {
-    if (error != cudaSuccess) throw std::runtime_error(std::string("CUDA: ") + cudaGetErrorString(error));
-}
-
-// Makes the call's device the current one, and gives the old one back.
-class current_device {
-public:
-    explicit current_device(const device_stream& on) {
-        check(cudaGetDevice(&before_));
-        check(cudaSetDevice(on.device));
-    }
-    ~current_device() { (void)cudaSetDevice(before_); }
-    current_device(const current_device&) = delete;
-    current_device& operator=(const current_device&) = delete;
-
-private:
-    int before_ = 0;
-};
-
-// The backend of one call, which keeps neither graphs nor locked memory for later ones.
-struct call_backend {
-    cuda_backend backend;
-    explicit call_backend(const device_stream& on) : backend(reinterpret_cast<cudaStream_t>(on.stream)) {
-        backend.use_graphs = false;
-        backend.use_pinned_memory = false;
-    }
-};
+using namespace bindings; // what all bindings share
 
 // A thread for each of `n` elements.
 template <class F>

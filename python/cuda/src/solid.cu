@@ -7,8 +7,6 @@
 
 namespace voxelpipe::python {
 
-using namespace bindings; // what all bindings share
-
 status draw_solid(const device_stream& on, const mesh_view<>& mesh, const std::vector<std::uint64_t>& first_triangles,
                   const grid& g, const solid_options& options, std::uint8_t* out) {
     using mask = target<std::uint8_t, blend::replace>;

@@ -11,14 +11,31 @@
 //
 // Needs the library and GLM alone, so that it can be built for any machine:
 //   COMPILER -std=c++20 -O1 -I. tests/golden/hashes/*.cpp -o golden_hashes -pthread
+// With -DVOXELPIPE_GOLDEN_FEW it has the cases of coverages.cpp and distances.cpp alone, which is quick to compile.
 // scripts/golden.sh runs it.
 
 #include "main.hpp"
 
 #include <cpu_ref/backend.hpp>
 
+namespace {
+
+using backend_type = voxelpipe::cpu_backend;
+
+golden::case_table<backend_type> cases() {
+#if defined(VOXELPIPE_GOLDEN_FEW)
+    golden::case_table<backend_type> few;
+    golden::add_coverages(few);
+    golden::add_distances(few);
+    return few;
+#else
+    return golden::all_cases<backend_type>();
+#endif
+}
+
+} // namespace
+
 int main(int argc, char** argv) {
-    using backend_type = voxelpipe::cpu_backend;
-    return golden::run_program({argv + 1, argv + argc}, golden::all_cases<backend_type>(),
+    return golden::run_program({argv + 1, argv + argc}, cases(),
                                [](unsigned threads) { return backend_type{threads}; });
 }

@@ -46,6 +46,7 @@ volume with_all_types(std::uint32_t most) {
     v.add("material", scalar::i32);
     v.add("depth", scalar::f32);
     v.add("normal", scalar::f32, 3);
+    v.add("fraction", scalar::f32);
     for (std::size_t c = 0; c < v.channels.size(); ++c) fill(v, c);
     channel& count = *v.find("count");
     for (std::int64_t i = 0; i < v.num_voxels(); ++i)
@@ -87,7 +88,9 @@ TEST_F(Vdb, HoldsEveryChannelWhereThereAreVoxels) {
     const volume v = with_all_types(100);
     ASSERT_EQ(std::vector<std::filesystem::path>{folder_ / "a.vdb"}, write(v, folder_ / "a.vdb"));
     const grids found = read(folder_ / "a.vdb");
-    EXPECT_EQ(7U, found.size());
+    EXPECT_EQ(8U, found.size());
+    EXPECT_EQ(openvdb::GRID_FOG_VOLUME, found.at("fraction")->getGridClass());
+    EXPECT_EQ(openvdb::GRID_UNKNOWN, found.at("depth")->getGridClass());
     const color_tables tables = make_color_tables();
     const auto byte = [&](std::size_t i, std::size_t c) { return value_at<std::uint8_t>(v, "color", i, c, 4); };
     expect_values<openvdb::MaskGrid>(found, "occupancy", v, [](std::size_t) { return true; });
@@ -102,6 +105,8 @@ TEST_F(Vdb, HoldsEveryChannelWhereThereAreVoxels) {
     expect_values<openvdb::Int32Grid>(found, "material", v,
                                       [&](std::size_t i) { return value_at<std::int32_t>(v, "material", i); });
     expect_values<openvdb::FloatGrid>(found, "depth", v, [&](std::size_t i) { return value_at<float>(v, "depth", i); });
+    expect_values<openvdb::FloatGrid>(found, "fraction", v,
+                                      [&](std::size_t i) { return value_at<float>(v, "fraction", i); });
     expect_values<openvdb::Vec3SGrid>(found, "normal", v, [&](std::size_t i) {
         return openvdb::Vec3s(value_at<float>(v, "normal", i, 0, 3), value_at<float>(v, "normal", i, 1, 3),
                               value_at<float>(v, "normal", i, 2, 3));

@@ -95,7 +95,7 @@ public:
             draw_plain(result, voxels);
         else
             draw_nearest(result, voxels);
-        if (has_triangles_to_measure(stats_)) {
+        if (!uploaded_->draws().empty()) {
             read_back();
             if (numbers) resolve_numbers(result);
         } else {
@@ -164,7 +164,7 @@ private:
         status.or_throw();
         stats_.triangles_dropped = status.counts.triangles_dropped();
         stats_.triangles_drawn += status.counts.triangles_drawn;
-        stats_.triangles_flat += status.counts.triangles_zero_area;
+        stats_.triangles_flat = status.counts.triangles_zero_area;
         stats_.fragments += status.counts.fragments;
         stats_.voxels += status.distance.band_samples;
         if (!request_.distance->is_signed) return;

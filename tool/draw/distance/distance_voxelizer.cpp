@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <new>
@@ -29,67 +30,58 @@ bool is_of_nearest(target id) {
            id == target::material || id == target::triangle || id == target::depth;
 }
 
-double distance_need(const scene& model, const voxelize_request& request) {
+distance_bytes::distance_bytes(const voxelize_request& request) {
     const glm::dvec3 n(request.grid.extent);
-    const double samples = n.x * n.y * n.z;
+    const double all = n.x * n.y * n.z;
     bool numbers = false, shaded = false;
     for (const target id : request.targets) {
         numbers = numbers || id == target::nearest || id == target::triangle || id == target::material;
         shaded = shaded || id != target::distance;
     }
-    // A vertex as it is snapped, with what shaders hand on; a triangle's box, number and part of the tree.
-    constexpr double vertex_bytes = 24, triangle_bytes = 160, crossing_bytes = 16, thread_bytes = 1 << 20;
-    const double triangles = static_cast<double>(model.triangle_count());
-    double bytes = volume_bytes(request) + (numbers ? 4 * samples : 0);
-    bytes += static_cast<double>(model.vertex_count()) * (vertex_bytes + (shaded ? sizeof(surface_varyings) : 0.0));
-    bytes += triangles * triangle_bytes + thread_count(request.threads) * thread_bytes;
-    if (request.distance->is_signed) bytes += samples / 8 + triangles * crossing_bytes;
-    if (request.write_bytes) {
-        // The band of a surface as large as the grid's.
-        const double band =
-            request.distance->is_whole
-                ? samples
-                : std::min(samples, 2 * (n.x * n.y + n.y * n.z + n.z * n.x) * 2 * request.distance->band);
-        constexpr double brick_voxels = 512, filled = 0.5;
-        bytes = std::max(bytes, volume_bytes(request) +
-                                    request.write_bytes(std::min(band / filled, samples) / brick_voxels, band, 0));
-    }
-    return bytes;
+    constexpr double triangle_bytes = 224, crossing_bytes = 16, thread_bytes = 1 << 20;
+    samples = volume_bytes(request) + (numbers ? 4 * all : 0);
+    if (shaded) vertex += sizeof(surface_varyings);
+    triangle = triangle_bytes + (request.distance->is_signed ? crossing_bytes : 0);
+    threads = thread_count(request.threads) * thread_bytes;
+    if (request.distance->is_signed) samples += all / 8;
+}
+
+double written_bytes(const voxelize_request& request) {
+    if (!request.write_bytes) return 0;
+    const glm::dvec3 n(request.grid.extent);
+    const double samples = n.x * n.y * n.z;
+    // The band of a surface as large as the grid's.
+    const double band = request.distance->is_whole
+                            ? samples
+                            : std::min(samples, 2 * (n.x * n.y + n.y * n.z + n.z * n.x) * 2 * request.distance->band);
+    constexpr double brick_voxels = 512, filled = 0.5;
+    return volume_bytes(request) + request.write_bytes(std::min(band / filled, samples) / brick_voxels, band, 0);
 }
 
 namespace {
 
-// The request of some layers of its grid.
-voxelize_request request_of_layers(const voxelize_request& request, int begin, int end) {
-    voxelize_request part = request;
-    part.grid = request.grid.crop({0, 0, begin}, {request.grid.extent.x, request.grid.extent.y, end - begin});
-    return part;
+double distance_need(const scene& model, const voxelize_request& request) {
+    return std::max(written_bytes(request), distance_bytes(request).of(static_cast<double>(model.triangle_count()),
+                                                                       static_cast<double>(model.vertex_count())));
 }
 
-// A model whose field is drawn slab by slab on the CPU, as its values are asked for. Two slabs are kept, so that
-// threads that read near each other find theirs.
-class late_distances {
+// A field of which two slabs are kept, so that threads that read near each other find theirs.
+class late_field {
 public:
-    // layers: of a slab. stats: as of run_distance_voxelizer.
-    late_distances(scene&& model, const voxelize_request& request, int layers, voxelize_stats& stats)
-        : model_(std::move(model)), request_(request), whole_(request.grid), layers_(layers),
-          stats_(stats), on_{static_cast<unsigned>(thread_count(request.threads))},
-          drawer_(on_, model_, request_, stats),
-          is_counted_(static_cast<std::size_t>((whole_.extent.z + layers - 1) / layers)) {
-        request_.progress = nullptr; // that of the outputs goes on
-    }
+    late_field(glm::ivec3 extent, std::vector<int> ends, std::function<volume(std::size_t)> draw, voxelize_stats& stats)
+        : extent_(extent), ends_(std::move(ends)), draw_(std::move(draw)), stats_(stats), is_counted_(ends_.size()) {}
 
     // Values of a channel of the field, from number `first` on. Any thread may call it.
     void read(std::size_t channel, std::uint64_t first, std::span<std::byte> to) {
         const std::lock_guard lock(mutex_);
-        const std::uint64_t layer =
-            static_cast<std::uint64_t>(whole_.extent.x) * static_cast<std::uint64_t>(whole_.extent.y);
+        const std::uint64_t layer = static_cast<std::uint64_t>(extent_.x) * static_cast<std::uint64_t>(extent_.y);
         while (!to.empty()) {
-            const std::size_t slab = static_cast<std::size_t>(first / layer) / static_cast<std::size_t>(layers_);
+            const auto slab = static_cast<std::size_t>(
+                std::upper_bound(ends_.begin(), ends_.end(), static_cast<int>(first / layer)) - ends_.begin());
             const volume& v = slab_of(slab);
             const auto& data = v.channels[channel].data;
-            const std::uint64_t values = static_cast<std::uint64_t>(v.num_voxels()),
-                                skipped = first - slab * static_cast<std::uint64_t>(layers_) * layer;
+            const auto begin = static_cast<std::uint64_t>(slab == 0 ? 0 : ends_[slab - 1]);
+            const std::uint64_t values = static_cast<std::uint64_t>(v.num_voxels()), skipped = first - begin * layer;
             const std::size_t each = data.size() / static_cast<std::size_t>(values);
             const std::size_t count = std::min(to.size() / each, static_cast<std::size_t>(values - skipped));
             std::memcpy(to.data(), data.data() + static_cast<std::size_t>(skipped) * each, count * each);
@@ -97,7 +89,6 @@ public:
             first += count;
         }
     }
-    [[nodiscard]] std::size_t num_slabs() const { return is_counted_.size(); }
 
 private:
     struct kept {
@@ -111,27 +102,48 @@ private:
         if (kept_[0].slab == slab) return kept_[0].field;
         kept_[1] = {};
         std::swap(kept_[0], kept_[1]);
-        const int begin = static_cast<int>(slab) * layers_, end = std::min(whole_.extent.z, begin + layers_);
-        request_.grid = whole_.crop({0, 0, begin}, {whole_.extent.x, whole_.extent.y, end - begin});
         const voxelize_stats before = stats_;
-        kept_[0].field = drawer_.run();
+        kept_[0].field = draw_(slab);
         kept_[0].slab = slab;
         if (is_counted_[slab] != 0) stats_ = before;
         is_counted_[slab] = 1;
         return kept_[0].field;
     }
 
-    scene model_;
-    voxelize_request request_;
-    voxelpipe::grid whole_;
-    int layers_;
+    glm::ivec3 extent_;
+    std::vector<int> ends_; // layers of slabs
+    std::function<volume(std::size_t)> draw_;
     voxelize_stats& stats_;
-    vp::cpu_backend on_;
-    distance_drawer<vp::cpu_backend> drawer_;
     std::vector<char> is_counted_;
     kept kept_[2];
     std::mutex mutex_;
 };
+
+// What draws slabs of a model that is held, on the CPU.
+struct loaded_distances {
+    scene model;
+    voxelize_request request; // of the slab
+    vp::cpu_backend on;
+    std::optional<distance_drawer<vp::cpu_backend>> drawer; // of these
+
+    // stats: as of run_distance_voxelizer.
+    loaded_distances(scene&& moved, const voxelize_request& all, voxelize_stats& stats)
+        : model(std::move(moved)), request(all), on{static_cast<unsigned>(thread_count(all.threads))} {
+        request.progress = nullptr; // that of the outputs goes on
+        drawer.emplace(on, model, request, stats);
+    }
+    [[nodiscard]] volume run(const voxelpipe::grid& whole, int begin, int end) {
+        request.grid = whole.crop({0, 0, begin}, {whole.extent.x, whole.extent.y, end - begin});
+        return drawer->run();
+    }
+};
+
+// The request of some layers of its grid.
+voxelize_request request_of_layers(const voxelize_request& request, int begin, int end) {
+    voxelize_request part = request;
+    part.grid = request.grid.crop({0, 0, begin}, {request.grid.extent.x, request.grid.extent.y, end - begin});
+    return part;
+}
 
 // Layers of slabs of which two fit, a multiple of distance_request::slab_layers; none: the field is drawn at once.
 // Throws memory_error where it cannot be.
@@ -169,6 +181,22 @@ std::optional<int> layers_of_slabs(const scene& model, const voxelize_request& r
 
 } // namespace
 
+volume make_late_field(const voxelize_request& request, std::vector<int> ends,
+                       const std::function<volume(std::size_t)>& draw, voxelize_stats& stats) {
+    volume field = volume_of(request.grid);
+    field.distances = distance_field{vp::core::band_distance(options_of(*request.distance).band, request.grid),
+                                     request.distance->is_signed};
+    const auto drawn = std::make_shared<late_field>(request.grid.extent, std::move(ends), draw, stats);
+    for (std::size_t c = 0; c < request.targets.size(); ++c) {
+        const target_info& info = info_of(request.targets[c]);
+        field.channels.push_back({std::string(info.name), info.type, info.components, {}});
+        field.channels.back().read = [drawn, c](std::uint64_t first, std::span<std::byte> to) {
+            drawn->read(c, first, to);
+        };
+    }
+    return field;
+}
+
 bool is_drawn_late(const volume& v) { return !v.channels.empty() && v.channels.front().read != nullptr; }
 
 void add_distance_warnings(const voxelize_request& request, voxelize_stats& stats) {
@@ -193,19 +221,17 @@ volume run_distance_voxelizer(scene&& model, const voxelize_request& request, vo
         if (layers) {
             stats.backend = "cpu";
             stats.threads = thread_count(request.threads);
-            volume field = volume_of(request.grid);
-            field.distances = distance_field{vp::core::band_distance(options_of(*request.distance).band, request.grid),
-                                             request.distance->is_signed};
-            const auto drawn = std::make_shared<late_distances>(std::move(model), request, *layers, stats);
-            stats.slabs = static_cast<int>(drawn->num_slabs());
-            for (std::size_t c = 0; c < request.targets.size(); ++c) {
-                const target_info& info = info_of(request.targets[c]);
-                field.channels.push_back({std::string(info.name), info.type, info.components, {}});
-                field.channels.back().read = [drawn, c](std::uint64_t first, std::span<std::byte> to) {
-                    drawn->read(c, first, to);
-                };
-            }
-            return field;
+            std::vector<int> ends;
+            for (int end = 0; end < request.grid.extent.z;)
+                ends.push_back(end = std::min(end + *layers, request.grid.extent.z));
+            stats.slabs = static_cast<int>(ends.size());
+            const auto drawn = std::make_shared<loaded_distances>(std::move(model), request, stats);
+            return make_late_field(
+                request, ends,
+                [drawn, ends, whole = request.grid](std::size_t i) {
+                    return drawn->run(whole, i == 0 ? 0 : ends[i - 1], ends[i]);
+                },
+                stats);
         }
         if (request.backend != backend_choice::cpu)
             if (std::optional<volume> drawn = draw_on_cuda(model, request, false, stats,

@@ -165,7 +165,7 @@ drawn_cells drawn_fractions(const voxelize_request& request, const surface_layer
     const double triangles = surface.primitives();
     const double pairs = surface.voxels() + 2 * std::sqrt(surface.voxels() * triangles) + triangles;
     const bool measures = has_area || has_centroid;
-    const double sorted = (measures ? 128 : 56) * pairs, listed = (measures ? 104 : 34) * pairs;
+    const double sorted = (measures ? 208 : 64) * pairs, listed = (measures ? 104 : 34) * pairs;
     const double targets = 4 + (has_area ? 4 : 0) + (has_centroid ? 12 : 0);
     drawn_cells cells{0, 0, counts.bricks, half_a_brick * counts.bricks, 0};
     cells.in_tiles = std::max(0.0, std::abs(surface.volume()) - cells.voxels);

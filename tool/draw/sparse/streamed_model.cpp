@@ -89,36 +89,6 @@ void add_time(voxelize_stats& stats, const char* stage, std::chrono::steady_cloc
     stats.milliseconds.emplace_back(stage, time.count());
 }
 
-// The triangles of each slab.
-template <class Varyings>
-void bin_triangles(triangle_stream& model, const corner_placer& classify, const stream_place& place, double room,
-                   int layers, streamed_vote& vote, std::vector<streamed_slab<Varyings>>& parts) {
-    // The first slab that ends behind a layer.
-    std::vector<std::size_t> first_slab(static_cast<std::size_t>(layers) + 1, parts.size());
-    for (std::size_t s = parts.size(); s-- > 0;) std::fill_n(first_slab.begin(), parts[s].layers.end, s);
-    std::vector<slabs::bin<corner_record<Varyings>>> bins(parts.size());
-    {
-        slabs::bin_memory<corner_record<Varyings>> spilled(static_cast<std::uint64_t>(room / 8), bins.size(),
-                                                           place.folder.string());
-        model.for_each_block([&](const triangle_stream::block& block) {
-            vote.add(block);
-            for (std::size_t i = 0; 3 * i < block.corners.size(); ++i) {
-                const slabs::classified c = classify(block.part, block.corners.data() + 3 * i);
-                if (c.kind != vp::core::triangle_class::drawn) continue;
-                const corner_record<Varyings> r = record_of<Varyings>(block, i);
-                for (std::size_t s = first_slab[static_cast<std::size_t>(c.reach.lo[2])];
-                     s < parts.size() && parts[s].layers.begin <= c.reach.hi[2]; ++s) {
-                    spilled.push(bins, s, r);
-                    std::vector<part_count>& counts = parts[s].parts;
-                    if (counts.empty() || counts.back().part != block.part) counts.push_back({block.part, 0});
-                    ++counts.back().triangles;
-                }
-            }
-        });
-    }
-    for (std::size_t s = 0; s < parts.size(); ++s) parts[s].triangles = std::move(bins[s]);
-}
-
 // --fill body: what the draws of a slab need to know of the model's bodies.
 class streamed_bodies {
 public:
@@ -214,7 +184,8 @@ void draw_streamed_as(triangle_stream& model, const stream_place& place, const v
         drawn.reserve(parts.size());
         for (const auto& part : parts) drawn.push_back(drawn_layers(part.layers));
         streamed_vote vote(model, request, drawn);
-        bin_triangles(model, classify, place, room, whole.extent.z, vote, parts);
+        bin_triangles(model, classify, place.folder.string(), room, whole.extent.z, parts,
+                      [&](const triangle_stream::block& block) { vote.add(block); });
         add_time(stats, "bin", start);
         stats.triangles_dropped = counts.triangles_dropped();
         stats.triangles_flat = counts.triangles_zero_area;
@@ -316,14 +287,7 @@ void draw_streamed(triangle_stream& model, const stream_place& place, const voxe
     const auto draw = [&]<class Varyings>(Varyings) {
         draw_streamed_as<Varyings>(model, place, request, ranges, stats, sink);
     };
-    if (model.has_colors() && model.has_texcoords())
-        draw(vertex_texcoord_color{});
-    else if (model.has_colors())
-        draw(vertex_color{});
-    else if (model.has_texcoords())
-        draw(vertex_texcoord{});
-    else
-        draw(vp::no_varyings{});
+    with_varyings(model, draw);
 }
 
 sparse_volume run_streamed_voxelizer(triangle_stream& model, const stream_place& place, const voxelize_request& request,

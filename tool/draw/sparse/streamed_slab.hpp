@@ -19,6 +19,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -76,7 +77,7 @@ corner_record<Varyings> record_of(const triangle_stream::block& from, std::size_
 class corner_placer {
 public:
     corner_placer(const voxelize_request& request, const triangle_stream& model)
-        : how_{request.coverage, request.solid.has_value(), repair_of(request)} {
+        : how_{request.coverage, request.solid.has_value(), repair_of(request), halo_of(request)} {
         for (const triangle_stream::part& p : model.parts())
             places_.emplace_back(p.to_world, reference_point(request.grid));
         grid_ = request.grid;
@@ -90,6 +91,8 @@ public:
         if (c.reach.empty() && c.kind == vp::core::triangle_class::drawn) c.kind = vp::core::triangle_class::outside;
         return c;
     }
+    // True if a slab that such a triangle reaches needs it.
+    [[nodiscard]] bool takes(const slabs::classified& c) const { return how_.takes(c.kind) && !c.reach.empty(); }
     // The grid that surface_layers are of.
     [[nodiscard]] const voxelpipe::grid& grid() const { return grid_; }
     void add_to(surface_layers& surface, std::size_t part, const glm::vec3* corners) const {
@@ -104,6 +107,12 @@ private:
         if (!request.solid) return vp::repair::none;
         if (request.solid->rule == solid_rule::exterior) return vp::repair::exterior;
         return request.solid->vote ? vp::repair::vote : vp::repair::none; // lids lie where the triangles do
+    }
+    // Layers that the band of --distance reaches beyond a triangle; below 0 without it.
+    [[nodiscard]] static glm::ivec3 halo_of(const voxelize_request& request) {
+        if (!request.distance) return glm::ivec3(-1);
+        const distance_request& distance = *request.distance;
+        return vp::core::band_halo(distance.is_whole ? vp::band::whole : vp::band(distance.band), request.grid);
     }
 
     std::vector<placed_vertex_shader> places_; // by part
@@ -126,6 +135,50 @@ struct streamed_slab {
     slabs::bin<corner_record<Varyings>> triangles;
     std::vector<part_count> parts; // of its triangles, in their order
 };
+
+// Gives each slab the triangles that it needs. room: bytes that the run may take, an eighth of which the triangles may
+// have; the others go to temporary files in `folder`. layers: of the grid. also(block): is called with all triangles,
+// too. Throws as triangle_stream::read_part, and std::system_error of files.
+template <class Varyings, class Also>
+void bin_triangles(triangle_stream& model, const corner_placer& classify, const std::string& folder, double room,
+                   int layers, std::vector<streamed_slab<Varyings>>& parts, const Also& also) {
+    // The first slab that ends behind a layer.
+    std::vector<std::size_t> first_slab(static_cast<std::size_t>(layers) + 1, parts.size());
+    for (std::size_t s = parts.size(); s-- > 0;) std::fill_n(first_slab.begin(), parts[s].layers.end, s);
+    std::vector<slabs::bin<corner_record<Varyings>>> bins(parts.size());
+    {
+        slabs::bin_memory<corner_record<Varyings>> spilled(static_cast<std::uint64_t>(room / 8), bins.size(), folder);
+        model.for_each_block([&](const triangle_stream::block& block) {
+            also(block);
+            for (std::size_t i = 0; 3 * i < block.corners.size(); ++i) {
+                const slabs::classified c = classify(block.part, block.corners.data() + 3 * i);
+                if (!classify.takes(c)) continue;
+                const corner_record<Varyings> r = record_of<Varyings>(block, i);
+                for (std::size_t s = first_slab[static_cast<std::size_t>(c.reach.lo[2])];
+                     s < parts.size() && parts[s].layers.begin <= c.reach.hi[2]; ++s) {
+                    spilled.push(bins, s, r);
+                    std::vector<part_count>& counts = parts[s].parts;
+                    if (counts.empty() || counts.back().part != block.part) counts.push_back({block.part, 0});
+                    ++counts.back().triangles;
+                }
+            }
+        });
+    }
+    for (std::size_t s = 0; s < parts.size(); ++s) parts[s].triangles = std::move(bins[s]);
+}
+
+// Calls f(a vertex's varyings) with the type of those that the model has.
+template <class F>
+void with_varyings(const triangle_stream& model, const F& f) {
+    if (model.has_colors() && model.has_texcoords())
+        f(vertex_texcoord_color{});
+    else if (model.has_colors())
+        f(vertex_color{});
+    else if (model.has_texcoords())
+        f(vertex_texcoord{});
+    else
+        f(vp::no_varyings{});
+}
 
 // A slab's triangles as a scene of the parts that are there. A primitive's triangles have the numbers of the whole
 // model: `whole` counts those of parts that are left out before it, too.

@@ -73,22 +73,22 @@ struct pixel_sums {
 
 // A polygon's moments about the centre of its voxel, in the projection, positive where n_x < 0: integrals of y and z;
 // of y h and z h, where h is the distance along x to the voxel's upper face; and of x over that distance, h (1 - h) /
-// 2.
+// 2. Its corners are measured.
 struct polygon_moments {
     double cover_y, cover_z, volume_x, volume_y, volume_z;
 };
 template <bool WithVolume, class Int>
-[[nodiscard]] VOXELPIPE_HD polygon_moments sum_moments(const cell_triangle<Int>& t, const cutting_planes& planes,
-                                                       const cut_polygon& poly, std::int64_t y, std::int64_t z,
-                                                       std::int64_t x_place) {
+[[nodiscard]] VOXELPIPE_HD polygon_moments sum_moments(const cell_triangle<Int>& t, const cut_corners<Int>& corners,
+                                                       const cut_polygon& poly, std::int64_t x_place) {
     polygon_moments s{0.0, 0.0, 0.0, 0.0, 0.0};
     if (poly.count < 3) return s;
     struct corner {
         double y, z, h;
     };
     const auto corner_at = [&](int i) {
-        corner c{corner_value(t, planes, poly, i, 1, y) - 0.5, corner_value(t, planes, poly, i, 2, z) - 0.5, 0.0};
-        if constexpr (WithVolume) c.h = -corner_value(t, planes, poly, i, 0, x_place);
+        const int k = poly.corner[i];
+        corner c{corners.y[k] - 0.5, corners.z[k] - 0.5, 0.0};
+        if constexpr (WithVolume) c.h = -corner_value(t, corners.at[k], 0, x_place);
         return c;
     };
     // Sums of products of two linear functions' corners: the integral over a triangle of area A is A / 12 of it.
@@ -151,7 +151,7 @@ template <class Int>
 
 // The area of a polygon, and its moments about the centre of the voxel at `base`, in the triangle's units.
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD area_terms sum_areas(const cell_triangle<Int>& t, const cutting_planes& planes,
+[[nodiscard]] VOXELPIPE_HD area_terms sum_areas(const cell_triangle<Int>& t, const cut_corners<Int>& corners,
                                                 const cut_polygon& poly, const std::int64_t (&base)[3],
                                                 const area_ratio& of) {
     if (poly.count < 3) return {0, 0, 0, 0};
@@ -161,7 +161,7 @@ template <class Int>
     };
     const auto corner_at = [&](int i) {
         corner c{};
-        for (int a = 0; a < 3; ++a) c.at[a] = corner_value(t, planes, poly, i, a, base[a]) - 0.5;
+        for (int a = 0; a < 3; ++a) c.at[a] = corner_value(t, corners.at[poly.corner[i]], a, base[a]) - 0.5;
         return c;
     };
     double area = 0.0, moment[3] = {0.0, 0.0, 0.0};

@@ -107,27 +107,26 @@ template <bool WithMoments, class Int>
 }
 
 // A polygon within a pixel: minus its area in the projection, positive where n_x < 0; and minus the integral of the
-// distance along x to the plane at x_place, which lies no further than a voxel.
+// distance along x to the plane at x_place, which lies no further than a voxel. Its corners are measured.
 struct polygon_sums {
     double cover, volume;
 };
 template <bool WithVolume, class Int>
-[[nodiscard]] VOXELPIPE_HD polygon_sums sum_polygon(const cell_triangle<Int>& t, const cutting_planes& planes,
-                                                    const cut_polygon& poly, std::int64_t y, std::int64_t z,
-                                                    std::int64_t x_place) {
+[[nodiscard]] VOXELPIPE_HD polygon_sums sum_polygon(const cell_triangle<Int>& t, const cut_corners<Int>& corners,
+                                                    const cut_polygon& poly, std::int64_t x_place) {
     polygon_sums s{0.0, 0.0};
     if (poly.count < 3) return s;
     const auto x_of = [&](int i) {
         if constexpr (WithVolume)
-            return -corner_value(t, planes, poly, i, 0, x_place);
+            return -corner_value(t, corners.at[poly.corner[i]], 0, x_place);
         else
             return 0.0;
     };
-    const double y0 = corner_value(t, planes, poly, 0, 1, y), z0 = corner_value(t, planes, poly, 0, 2, z), x0 = x_of(0);
-    double dy = corner_value(t, planes, poly, 1, 1, y) - y0, dz = corner_value(t, planes, poly, 1, 2, z) - z0;
+    const double y0 = corners.y[poly.corner[0]], z0 = corners.z[poly.corner[0]], x0 = x_of(0);
+    double dy = corners.y[poly.corner[1]] - y0, dz = corners.z[poly.corner[1]] - z0;
     double x1 = x_of(1);
     for (int i = 2; i < poly.count; ++i) {
-        const double ey = corner_value(t, planes, poly, i, 1, y) - y0, ez = corner_value(t, planes, poly, i, 2, z) - z0;
+        const double ey = corners.y[poly.corner[i]] - y0, ez = corners.z[poly.corner[i]] - z0;
         const double x2 = x_of(i);
         const double twice = exact::fma(dz, ey, -exact::mul(dy, ez));
         s.cover = exact::fma(twice, 0.5, s.cover);
@@ -159,11 +158,11 @@ struct cell_span {
     std::int64_t first, last;
 };
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD cell_span span_of(const cell_triangle<Int>& t, const cutting_planes& planes,
+[[nodiscard]] VOXELPIPE_HD cell_span span_of(const cell_triangle<Int>& t, const cut_corners<Int>& corners,
                                              const cut_polygon& poly) {
     double lo = 0.0, hi = 0.0;
     for (int i = 0; i < poly.count; ++i) {
-        const double x = corner_value(t, planes, poly, i, 0, 0);
+        const double x = corner_value(t, corners.at[poly.corner[i]], 0, 0);
         lo = i == 0 || x < lo ? x : lo;
         hi = i == 0 || x > hi ? x : hi;
     }
@@ -174,7 +173,7 @@ template <class Int>
     };
     const auto all = [&](std::int64_t plane, int sign) { // sign 1: no corner below the plane, -1: none above
         for (int i = 0; i < poly.count; ++i)
-            if (corner_side(t, planes, poly, i, 0, plane << t.fraction) * sign < 0) return false;
+            if (corner_side(corners.at[poly.corner[i]], 0, plane << t.fraction) * sign < 0) return false;
         return true;
     };
     std::int64_t first = floor_of(lo - 0x1p-10), last = -floor_of(-hi - 0x1p-10) - 1;
@@ -183,20 +182,21 @@ template <class Int>
     return {first < last ? first : last, last};
 }
 
-// Sets what a triangle's part within a voxel measures. corner: the voxel's lowest, in the triangle's units.
+// Sets what a triangle's part within a voxel measures. corner: the voxel's lowest, in the triangle's units. The part's
+// corners are measured.
 template <class Terms, class Int>
-VOXELPIPE_HD void add_parts(const cell_triangle<Int>& t, const cutting_planes& planes, const cut_polygon& part,
+VOXELPIPE_HD void add_parts(const cell_triangle<Int>& t, const cut_corners<Int>& corners, const cut_polygon& part,
                             const std::int64_t (&corner)[3], const area_ratio& areas, Terms& terms) {
     const auto round = [&](double v) { return t.is_odd ? -round_to_cell_units(v) : round_to_cell_units(v); };
     const std::int64_t upper = corner[0] + (std::int64_t{1} << t.fraction);
-    terms.volume = round(sum_polygon<true>(t, planes, part, corner[1], corner[2], upper).volume);
+    terms.volume = round(sum_polygon<true>(t, corners, part, upper).volume);
     if constexpr (has_moments<Terms>) {
-        const polygon_moments m = sum_moments<true>(t, planes, part, corner[1], corner[2], upper);
+        const polygon_moments m = sum_moments<true>(t, corners, part, upper);
         terms.volume_x = round(m.volume_x);
         terms.volume_y = round(m.volume_y);
         terms.volume_z = round(m.volume_z);
     }
-    if constexpr (has_areas<Terms>) static_cast<area_terms&>(terms) = sum_areas(t, planes, part, corner, areas);
+    if constexpr (has_areas<Terms>) static_cast<area_terms&>(terms) = sum_areas(t, corners, part, corner, areas);
 }
 
 // Calls visit(y, z, i, terms) for each voxel of a pixel in which a part of the triangle lies, relative to its base: i
@@ -205,8 +205,8 @@ VOXELPIPE_HD void add_parts(const cell_triangle<Int>& t, const cutting_planes& p
 VOXELPIPE_ANY_CALLABLE
 template <bool OnlyCount, class Terms, class Int, class Visit>
 VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_polygon& column, cutting_planes& planes,
-                                         const cell_box& box, const area_ratio& areas, std::int64_t j, std::int64_t k,
-                                         Visit&& visit) {
+                                         cut_corners<Int>& corners, const cell_box& box, const area_ratio& areas,
+                                         std::int64_t j, std::int64_t k, Visit&& visit) {
     const std::int64_t y = j << t.fraction, z = k << t.fraction;
     const auto oriented = [&](std::int64_t v) { return t.is_odd ? -v : v; };
     pixel_sums row{0, 0, 0};
@@ -214,10 +214,19 @@ VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_
     row = {oriented(row.cover), oriented(row.y), oriented(row.z)};
     cell_span span{-1, -1}; // in the lower plane of the lowest voxel
     if (t.reach[0] > 1)
-        span = span_of(t, planes, column);
+        span = span_of(t, corners, column);
     else
         for (int c = 0; c < column.count; ++c)
-            if (corner_side(t, planes, column, c, 0, 0) > 0) span = {0, 0};
+            if (corner_side(corners.at[column.corner[c]], 0, 0) > 0) span = {0, 0};
+    const int num_corners = corners.count;
+    if (!OnlyCount)
+        for (int c = 0; c < column.count; ++c) measure_corner(t, corners, column.corner[c], y, z);
+    const auto cut_at = [&](int plane, std::int64_t place, cut_polygon& poly) {
+        const int known = corners.count;
+        planes.at[plane] = place << t.fraction;
+        cut(t, planes, plane, plane == 1, corners, poly);
+        for (int c = known; c < corners.count; ++c) measure_corner(t, corners, c, y, z);
+    };
     const std::int64_t before_box = box.lo[0] - 1;
     pixel_sums so_far{0, 0, 0}; // B at the lower face of the next voxel
     std::int64_t i = span.first;
@@ -235,16 +244,16 @@ VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_
         }
         const std::int64_t upper = i + 1;
         const bool is_last = upper > span.last;
-        cut_polygon lower = column;
-        planes.at[1] = upper << t.fraction;
         Terms terms{};
         if (!OnlyCount) {
-            if (!is_last) cut(t, planes, 1, true, lower);
+            cut_polygon lower = column;
+            corners.count = num_corners;
+            if (!is_last) cut_at(1, upper, lower);
             pixel_sums before = row;
             if (!is_last) {
-                before.cover = oriented(round_to_cell_units(sum_polygon<false>(t, planes, lower, y, z, 0).cover));
+                before.cover = oriented(round_to_cell_units(sum_polygon<false>(t, corners, lower, 0).cover));
                 if constexpr (has_moments<Terms>) {
-                    const polygon_moments m = sum_moments<false>(t, planes, lower, y, z, 0);
+                    const polygon_moments m = sum_moments<false>(t, corners, lower, 0);
                     before.y = oriented(round_to_cell_units(m.cover_y));
                     before.z = oriented(round_to_cell_units(m.cover_z));
                 }
@@ -256,12 +265,9 @@ VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_
             }
             so_far = before;
             if (i != before_box) {
-                if (i != span.first) {
-                    planes.at[0] = i << t.fraction;
-                    cut(t, planes, 0, false, lower);
-                }
+                if (i != span.first) cut_at(0, i, lower);
                 const std::int64_t corner[3] = {i << t.fraction, y, z};
-                add_parts(t, planes, lower, corner, areas, terms);
+                add_parts(t, corners, lower, corner, areas, terms);
             }
         }
         visit(j, k, i, terms);
@@ -273,13 +279,13 @@ VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_
 // True if a polygon that was cut to a pixel meets its inside.
 template <class Int>
 [[nodiscard]] VOXELPIPE_HD bool meets_inside(const cell_triangle<Int>& t, const cutting_planes& planes,
-                                             const cut_polygon& poly) {
+                                             const cut_corners<Int>& corners, const cut_polygon& poly) {
     for (int plane = 2; plane < 6; ++plane) {
         if (plane / 2 == t.lifted) continue; // all of it lies in the pixel's upper side
         bool has_any = false;
-        for (int i = 0; i < poly.count; ++i) {
-            const int s = corner_side(t, planes, poly, i, plane / 2, planes.at[plane]);
-            has_any = has_any || (plane % 2 == 0 ? s > 0 : s < 0);
+        for (int i = 0; i < poly.count && !has_any; ++i) {
+            const int s = corner_side(corners.at[poly.corner[i]], plane / 2, planes.at[plane]);
+            has_any = plane % 2 == 0 ? s > 0 : s < 0;
         }
         if (!has_any) return false;
     }
@@ -299,7 +305,12 @@ VOXELPIPE_HD void visit_only_cell(const cell_triangle<Int>& t, const cell_box& b
     Terms terms{};
     if constexpr (!OnlyCount && (has_moments<Terms> || has_areas<Terms>)) {
         const std::int64_t corner[3] = {0, 0, 0};
-        if (is_within) add_parts(t, cutting_planes{}, whole_triangle(), corner, areas, terms);
+        if (is_within) {
+            cut_corners<Int> corners;
+            const cut_polygon whole = whole_triangle(t, corners);
+            for (int c = 0; c < 3; ++c) measure_corner(t, corners, c, 0, 0);
+            add_parts(t, corners, whole, corner, areas, terms);
+        }
         if constexpr (has_moments<Terms>) { // of edges within the pixel these are rounded, unlike their covers
             const pixel_sums row = pixel_cover<true>(t, 0, 0);
             terms.cover_y = t.is_odd ? -row.y : row.y;
@@ -315,54 +326,107 @@ VOXELPIPE_HD void visit_only_cell(const cell_triangle<Int>& t, const cell_box& b
     visit(std::int64_t{0}, std::int64_t{0}, is_before ? box.lo[0] - 1 : is_behind ? box.hi[0] : 0, terms);
 }
 
+// The layers of pixels with one z that a triangle meets within a box, and the pixels' y.
+struct cell_pixels {
+    std::int64_t z_first, z_end, y_first, y_end;
+};
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD cell_pixels pixels_of(const cell_triangle<Int>& t, const cell_box& box) {
+    const auto later = [](std::int64_t p, std::int64_t q) { return p > q ? p : q; };
+    const auto earlier = [](std::int64_t p, std::int64_t q) { return p < q ? p : q; };
+    return {later(box.lo[2], 0), earlier(box.hi[2], t.reach[2]), later(box.lo[1], 0), earlier(box.hi[1], t.reach[1])};
+}
+// At least the number of pixels that for_each_cell_of_layer looks at in any layer: of a triangle that is cut to layers,
+// its widest section, as far as its edges go beside it within a layer, and those at the ends.
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD std::int64_t most_pixels_of_layer(const cell_triangle<Int>& t, const cell_pixels& all) {
+    const std::int64_t most = all.y_end - all.y_first;
+    if (t.reach[2] < 2 || most < 4) return most;
+    const double voxel = voxels_in_unit(t);
+    double beside = 0.0, height = 0.0;
+    for (int e = 0; e < 3; ++e) {
+        const auto &p = t.p[e], &q = t.p[e == 2 ? 0 : e + 1];
+        const double y = exact::to_double(q[1] > p[1] ? q[1] - p[1] : p[1] - q[1]) * voxel,
+                     z = exact::to_double(q[2] > p[2] ? q[2] - p[2] : p[2] - q[2]) * voxel;
+        beside += z > 1.0 ? y / z : y;
+        height = z > height ? z : height;
+    }
+    const double area = exact::to_double(t.n[0] < 0 ? -t.n[0] : t.n[0]) * voxel * voxel; // twice the projection's
+    const double pixels = area / height + beside + 3.0; // a layer is cut: the height is not 0
+    return pixels < exact::to_double(most) ? static_cast<std::int64_t>(pixels) : most;
+}
+
+// Calls visit(y, z, i, terms), as for_each_cell_of_pixel, for the voxels of a layer: of all its pixels, or of the one
+// with this number (one: 0 to most_pixels_of_layer - 1), which there may not be. whole: with its three corners.
+VOXELPIPE_ANY_CALLABLE
+template <bool OnlyCount, class Terms, class Int, class Visit>
+VOXELPIPE_HD void for_each_cell_of_layer(const cell_triangle<Int>& t, const cut_polygon& whole, cutting_planes& planes,
+                                         cut_corners<Int>& corners, const cell_box& box, const area_ratio& areas,
+                                         const cell_pixels& all, std::int64_t k, std::int64_t one, Visit&& visit) {
+    cut_polygon layer = whole;
+    corners.count = 3;
+    std::int64_t j_first = all.y_first, j_end = all.y_end;
+    planes.at[4] = k << t.fraction;
+    planes.at[5] = (k + 1) << t.fraction;
+    if (t.reach[2] > 1) {
+        if (k > 0) cut(t, planes, 4, false, corners, layer);
+        if (k + 1 < t.reach[2]) cut(t, planes, 5, true, corners, layer);
+        if (layer.count == 0) return;
+        if (t.reach[1] > 2) { // the pixels between the layer's ends, and one beyond where these are close to a side
+            double lo = 0.0, hi = 0.0;
+            for (int i = 0; i < layer.count; ++i) {
+                const double y = corner_value(t, corners.at[layer.corner[i]], 1, 0);
+                lo = i == 0 || y < lo ? y : lo;
+                hi = i == 0 || y > hi ? y : hi;
+            }
+            const auto first = static_cast<std::int64_t>(lo - 0x1p-10),
+                       end = static_cast<std::int64_t>(hi + 0x1p-10) + 1;
+            j_first = first > j_first ? first : j_first;
+            j_end = end < j_end ? end : j_end;
+        }
+    }
+    if (one >= 0) {
+        j_first += one;
+        j_end = j_first + 1 < j_end ? j_first + 1 : j_end;
+    }
+    const int num_corners = corners.count;
+    for (std::int64_t j = j_first; j < j_end; ++j) {
+        cut_polygon column = layer;
+        corners.count = num_corners;
+        planes.at[2] = j << t.fraction;
+        planes.at[3] = (j + 1) << t.fraction;
+        if (t.reach[1] > 1) {
+            if (j > 0) cut(t, planes, 2, false, corners, column);
+            if (j + 1 < t.reach[1]) cut(t, planes, 3, true, corners, column);
+        }
+        if (t.reach[1] > 1 || t.reach[2] > 1)
+            if (!meets_inside(t, planes, corners, column)) continue;
+        for_each_cell_of_pixel<OnlyCount, Terms>(t, column, planes, corners, box, areas, j, k, visit);
+    }
+}
+
+// True if a triangle lies within one voxel.
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD bool is_in_one_cell(const cell_triangle<Int>& t) {
+    return t.reach[0] == 1 && t.reach[1] == 1 && t.reach[2] == 1;
+}
+
 // Calls visit(y, z, i, terms) for all voxels in which a part of a triangle lies, as for_each_cell_of_pixel. areas: what
 // area_terms need.
 VOXELPIPE_ANY_CALLABLE
 template <bool OnlyCount, class Terms = cell_terms, class Int, class Visit>
 VOXELPIPE_HD void for_each_cell(const cell_triangle<Int>& t, const cell_box& box, Visit&& visit,
                                 const area_ratio& areas = {0, 0.0}) {
-    if (t.reach[0] == 1 && t.reach[1] == 1 && t.reach[2] == 1) {
+    if (is_in_one_cell(t)) {
         visit_only_cell<OnlyCount, Terms>(t, box, areas, visit);
         return;
     }
     cutting_planes planes{};
-    const std::int64_t z_first = box.lo[2] > 0 ? box.lo[2] : 0, z_end = box.hi[2] < t.reach[2] ? box.hi[2] : t.reach[2];
-    const std::int64_t y_first = box.lo[1] > 0 ? box.lo[1] : 0, y_end = box.hi[1] < t.reach[1] ? box.hi[1] : t.reach[1];
-    for (std::int64_t k = z_first; k < z_end; ++k) {
-        cut_polygon layer = whole_triangle();
-        std::int64_t j_first = y_first, j_end = y_end;
-        planes.at[4] = k << t.fraction;
-        planes.at[5] = (k + 1) << t.fraction;
-        if (t.reach[2] > 1) {
-            cut(t, planes, 4, false, layer);
-            cut(t, planes, 5, true, layer);
-            if (layer.count == 0) continue;
-            if (t.reach[1] > 2) { // the pixels between the layer's ends, and one beyond where these are close to a side
-                double lo = 0.0, hi = 0.0;
-                for (int i = 0; i < layer.count; ++i) {
-                    const double y = corner_value(t, planes, layer, i, 1, 0);
-                    lo = i == 0 || y < lo ? y : lo;
-                    hi = i == 0 || y > hi ? y : hi;
-                }
-                const auto first = static_cast<std::int64_t>(lo - 0x1p-10),
-                           end = static_cast<std::int64_t>(hi + 0x1p-10) + 1;
-                j_first = first > j_first ? first : j_first;
-                j_end = end < j_end ? end : j_end;
-            }
-        }
-        for (std::int64_t j = j_first; j < j_end; ++j) {
-            cut_polygon column = layer;
-            planes.at[2] = j << t.fraction;
-            planes.at[3] = (j + 1) << t.fraction;
-            if (t.reach[1] > 1) {
-                cut(t, planes, 2, false, column);
-                cut(t, planes, 3, true, column);
-            }
-            if (t.reach[1] > 1 || t.reach[2] > 1)
-                if (!meets_inside(t, planes, column)) continue;
-            for_each_cell_of_pixel<OnlyCount, Terms>(t, column, planes, box, areas, j, k, visit);
-        }
-    }
+    cut_corners<Int> corners;
+    const cut_polygon whole = whole_triangle(t, corners);
+    const cell_pixels all = pixels_of(t, box);
+    for (std::int64_t k = all.z_first; k < all.z_end; ++k)
+        for_each_cell_of_layer<OnlyCount, Terms>(t, whole, planes, corners, box, areas, all, k, -1, visit);
 }
 
 } // namespace voxelpipe::core

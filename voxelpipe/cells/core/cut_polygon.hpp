@@ -3,8 +3,8 @@
 #pragma once
 
 // A triangle cut by planes of the lattice. A polygon is a cycle of sides: edges of the triangle, and the lines in which
-// its plane meets the cutting planes. A corner is the pair of sides that meet there, so its coordinates are quotients
-// of exact integers, and cutting decides by exact signs alone (docs/design.md, "Cut cells").
+// its plane meets the cutting planes. A corner is where two sides meet, so its coordinates are quotients of exact
+// integers, found once, and cutting decides by exact signs alone (docs/design.md, "Cut cells").
 
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/core/exact.hpp>
@@ -103,104 +103,131 @@ struct cutting_planes {
 };
 inline constexpr int first_plane_side = 3; // sides 0 to 2 are edges: side i runs from vertex i to vertex (i + 1) % 3
 
+// A corner relative to the triangle's base: quotients of exact integers, in the triangle's units.
+template <class Int>
+struct cut_corner {
+    Int numerator[3], denominator[3]; // no denominator is 0
+};
+
+// The corners of a triangle and of the polygons that it is cut to.
+template <class Int>
+struct cut_corners {
+    static constexpr int most =
+        15; // three, and two more a plane: two planes of a layer, two of a pixel, two of a voxel
+    cut_corner<Int> at[most];
+    double y[most], z[most]; // from the lowest corner of a pixel, in voxels, of the corners that were measured
+    int count;
+};
+
 struct cut_polygon {
     static constexpr int most = 9; // three corners, and one more a plane
     int count;
-    std::uint8_t from[most], to[most]; // the sides whose crossing a corner is
-    std::uint8_t side[most];           // the side that follows the corner
+    std::uint8_t corner[most]; // its number in the cut_corners
+    std::uint8_t side[most];   // the side that follows it
 };
 
-[[nodiscard]] VOXELPIPE_HD inline cut_polygon whole_triangle() {
+// The triangle as a polygon, whose corners become the first ones.
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD cut_polygon whole_triangle(const cell_triangle<Int>& t, cut_corners<Int>& corners) {
     cut_polygon p{};
-    p.count = 3;
+    p.count = corners.count = 3;
     for (int i = 0; i < 3; ++i) {
-        p.from[i] = static_cast<std::uint8_t>((i + 2) % 3);
-        p.to[i] = p.side[i] = static_cast<std::uint8_t>(i);
+        p.corner[i] = p.side[i] = static_cast<std::uint8_t>(i);
+        for (int axis = 0; axis < 3; ++axis) {
+            corners.at[i].numerator[axis] = static_cast<Int>(t.p[i][axis]);
+            corners.at[i].denominator[axis] = 1;
+        }
     }
     return p;
 }
 
-// A coordinate of a corner minus a place, as a fraction whose denominator is not 0.
+// Where a side meets a plane that it is not parallel to.
 template <class Int>
-struct corner_fraction {
-    Int numerator, denominator;
-};
-
-template <class Int>
-[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE corner_fraction<Int> corner_minus(const cell_triangle<Int>& t,
-                                                                              const cutting_planes& planes, int from,
-                                                                              int to, int axis, std::int64_t place) {
-    if (from < first_plane_side && to < first_plane_side) { // edges i - 1 and i meet in vertex i
-        const int v = (from + 1) % 3 == to ? to : from;
-        return {static_cast<Int>(t.p[v][axis] - place), 1};
-    }
-    if (from >= first_plane_side && (from - first_plane_side) / 2 == axis)
-        return {static_cast<Int>(planes.at[from - first_plane_side] - place), 1};
-    if (to >= first_plane_side && (to - first_plane_side) / 2 == axis)
-        return {static_cast<Int>(planes.at[to - first_plane_side] - place), 1};
-    if (from < first_plane_side || to < first_plane_side) { // an edge and a plane
-        const int e = from < first_plane_side ? from : to,
-                  plane = (from < first_plane_side ? to : from) - first_plane_side;
-        const int b = plane / 2, p = e, q = (e + 1) % 3;
-        const auto along = static_cast<Int>(t.p[q][b] - t.p[p][b]);
-        return {static_cast<Int>(t.p[p][axis] - place) * along +
-                    static_cast<Int>(t.p[q][axis] - t.p[p][axis]) * static_cast<Int>(planes.at[plane] - t.p[p][b]),
-                along};
+VOXELPIPE_HD void find_corner(const cell_triangle<Int>& t, const cutting_planes& planes, int side, int plane,
+                              cut_corner<Int>& c) {
+    const int b = plane / 2, next = 9 >> 2 * b & 3, last = 18 >> 2 * b & 3; // (b + 1) % 3 and (b + 2) % 3
+    const std::int64_t place = planes.at[plane];
+    c.numerator[b] = static_cast<Int>(place);
+    c.denominator[b] = 1;
+    if (side < first_plane_side) { // an edge
+        const auto &p = t.p[side], &q = t.p[side == 2 ? 0 : side + 1];
+        const auto along = static_cast<Int>(q[b] - p[b]), part = static_cast<Int>(place - p[b]);
+        c.numerator[next] = static_cast<Int>(p[next]) * along + static_cast<Int>(q[next] - p[next]) * part;
+        c.numerator[last] = static_cast<Int>(p[last]) * along + static_cast<Int>(q[last] - p[last]) * part;
+        c.denominator[next] = c.denominator[last] = along;
+        return;
     }
     // The triangle's plane on the line of two planes.
-    const int f = from - first_plane_side, g = to - first_plane_side;
-    const Int rest = t.n[f / 2] * static_cast<Int>(planes.at[f] - t.p[0][f / 2]) +
-                     t.n[g / 2] * static_cast<Int>(planes.at[g] - t.p[0][g / 2]);
-    return {-(rest + t.n[axis] * static_cast<Int>(place - t.p[0][axis])), t.n[axis]};
+    const int g = side - first_plane_side, a = g / 2, axis = 3 - a - b;
+    c.numerator[a] = static_cast<Int>(planes.at[g]);
+    c.denominator[a] = 1;
+    const Int rest = t.n[a] * static_cast<Int>(planes.at[g] - t.p[0][a]) + t.n[b] * static_cast<Int>(place - t.p[0][b]);
+    c.numerator[axis] = t.n[axis] * static_cast<Int>(t.p[0][axis]) - rest;
+    c.denominator[axis] = t.n[axis];
 }
 
 // The sign of a corner's coordinate minus a place.
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD int corner_side(const cell_triangle<Int>& t, const cutting_planes& planes,
-                                           const cut_polygon& poly, int corner, int axis, std::int64_t place) {
-    const auto f = corner_minus(t, planes, poly.from[corner], poly.to[corner], axis, place);
-    const int s = static_cast<int>(f.numerator > 0) - static_cast<int>(f.numerator < 0);
-    return f.denominator < 0 ? -s : s;
+[[nodiscard]] VOXELPIPE_HD int corner_side(const cut_corner<Int>& c, int axis, std::int64_t place) {
+    const Int d = c.denominator[axis], n = c.numerator[axis] - static_cast<Int>(place) * d;
+    const int s = static_cast<int>(n > 0) - static_cast<int>(n < 0);
+    return d < 0 ? -s : s;
+}
+
+// 2^-F.
+template <class Int>
+[[nodiscard]] VOXELPIPE_HD double voxels_in_unit(const cell_triangle<Int>& t) {
+    return core::bit_cast<double>(static_cast<std::uint64_t>(1023 - t.fraction) << 52);
 }
 
 // A coordinate of a corner minus a place, in voxels: exact numerator and denominator, one division.
 template <class Int>
-[[nodiscard]] VOXELPIPE_HD double corner_value(const cell_triangle<Int>& t, const cutting_planes& planes,
-                                               const cut_polygon& poly, int corner, int axis, std::int64_t place) {
-    const auto f = corner_minus(t, planes, poly.from[corner], poly.to[corner], axis, place);
-    const double voxel = core::bit_cast<double>(static_cast<std::uint64_t>(1023 - t.fraction) << 52); // 2^-F
-    const double numerator = exact::mul(exact::to_double(f.numerator), voxel);                        // exact
-    return f.denominator == 1 ? numerator : exact::div(numerator, exact::to_double(f.denominator));
+[[nodiscard]] VOXELPIPE_HD double corner_value(const cell_triangle<Int>& t, const cut_corner<Int>& c, int axis,
+                                               std::int64_t place) {
+    const Int d = c.denominator[axis], n = c.numerator[axis] - static_cast<Int>(place) * d;
+    return exact::div(exact::mul(exact::to_double(n), voxels_in_unit(t)), exact::to_double(d)); // the product is exact
+}
+
+// Sets a corner's y and z from a pixel's lowest corner.
+template <class Int>
+VOXELPIPE_HD void measure_corner(const cell_triangle<Int>& t, cut_corners<Int>& corners, int i, std::int64_t y,
+                                 std::int64_t z) {
+    corners.y[i] = corner_value(t, corners.at[i], 1, y);
+    corners.z[i] = corner_value(t, corners.at[i], 2, z);
 }
 
 // The part of a polygon with coordinates not above (is_upper) or not below a plane. Closed: a part may be a segment or
-// a point. plane: its number, whose place is in `planes`.
+// a point. plane: its number, whose place is in `planes`. New corners are added to the others.
 template <class Int>
 VOXELPIPE_HD void cut(const cell_triangle<Int>& t, const cutting_planes& planes, int plane, bool is_upper,
-                      cut_polygon& poly) {
+                      cut_corners<Int>& corners, cut_polygon& poly) {
     const int axis = plane / 2;
     const auto number = static_cast<std::uint8_t>(first_plane_side + plane);
     int inside[cut_polygon::most]; // sign: 1 within, 0 in the plane, -1 beyond
     bool has_beyond = false;
     for (int i = 0; i < poly.count; ++i) {
-        const int s = corner_side(t, planes, poly, i, axis, planes.at[plane]);
+        const int s = corner_side(corners.at[poly.corner[i]], axis, planes.at[plane]);
         inside[i] = is_upper ? -s : s;
         has_beyond = has_beyond || inside[i] < 0;
     }
     if (!has_beyond) return;
     cut_polygon r{};
-    const auto add = [&](std::uint8_t from, std::uint8_t to, std::uint8_t side) {
+    const auto add = [&](int corner, std::uint8_t side) {
         if (r.count == cut_polygon::most) return; // never: a convex polygon gains one corner a plane
-        r.from[r.count] = from;
-        r.to[r.count] = to;
+        r.corner[r.count] = static_cast<std::uint8_t>(corner);
         r.side[r.count++] = side;
+    };
+    const auto add_crossing = [&](std::uint8_t of, std::uint8_t side) {
+        if (corners.count == cut_corners<Int>::most) return; // never: it is crossed at most twice
+        find_corner(t, planes, of, plane, corners.at[corners.count]);
+        add(corners.count++, side);
     };
     for (int i = 0; i < poly.count; ++i) {
         const int here = inside[i], next = inside[i + 1 == poly.count ? 0 : i + 1];
         const std::uint8_t side = poly.side[i];
-        if (here >= 0) add(poly.from[i], poly.to[i], here == 0 && next < 0 ? number : side);
-        if (here > 0 && next < 0) add(side, number, number);
-        if (here < 0 && next > 0) add(side, number, side);
+        if (here >= 0) add(poly.corner[i], here == 0 && next < 0 ? number : side);
+        if (here > 0 && next < 0) add_crossing(side, number);
+        if (here < 0 && next > 0) add_crossing(side, side);
     }
     poly = r;
 }

@@ -42,8 +42,8 @@ namespace device {
 struct cell_state {
     pipeline_state call; // its index_error stops what follows
     std::uint64_t counts[core::index_of(core::cell_count::size)];
-    std::uint64_t all_records; // that there are
-    std::uint64_t records;     // that passes work on; 0 if not all fit
+    cell_list_state list;  // how many records there are
+    std::uint64_t records; // that passes work on; 0 if not all fit
     std::uint64_t triangles_in;
     std::uint64_t counts_voxels; // 0 or 1
 };
@@ -59,14 +59,13 @@ struct note_cells {
 };
 // Whether the records fit.
 struct bound_cell_records {
-    const unsigned long long* total;
     std::uint64_t room;
     cell_state* state;
     VOXELPIPE_HD void operator()(std::uint64_t) const {
+        const std::uint64_t total = state->list.num_terms;
         if (state->counts[core::index_of(core::cell_count::bad_index)] != 0) state->call.index_error |= bad_index;
-        if (*total > room) state->call.index_error |= stopped;
-        state->all_records = *total;
-        state->records = state->call.index_error == 0 ? *total : 0;
+        if (total > room) state->call.index_error |= stopped;
+        state->records = state->call.index_error == 0 ? total : 0;
     }
 };
 struct stop_large_windings {
@@ -123,14 +122,14 @@ public:
                     options.bodies == bodies::call ? 1 : std::uint64_t{draws.size()}};
         num_keys_ = static_cast<uint128>(rows_) * keys_of_.bodies * keys_of_.slots;
         if (!fits()) return;
-        const std::uint64_t sorted = std::max(room, num_edges());
+        const std::uint64_t sorted = std::max({room, num_named(), num_edges()});
         state_ = memory.take<cell_state>(1);
         positions_ = memory.take<core::snapped_position>(vertices_ + 1);
         indices_ = memory.take<glm::uvec3>(triangles_);
         first_triangle_ = memory.take<std::uint64_t>(draws.size());
         shaders_ = memory.take<cell_shader>(draws.size());
-        num_terms_ = memory.take<std::uint32_t>(triangles_ + 1);
-        first_term_ = memory.take<unsigned long long>(triangles_ + 1);
+        num_pixels_ = memory.take<std::uint32_t>(triangles_ + 1);
+        first_pixel_ = memory.take<unsigned long long>(triangles_ + 1);
         scan_bytes_ = cell_scan_bytes(static_cast<std::uint32_t>(triangles_ + 1));
         scan_ = memory.take<std::uint8_t>(scan_bytes_);
         for (int i = 0; i < 2; ++i) {
@@ -138,9 +137,11 @@ public:
             order_[i] = memory.take<std::uint32_t>(sorted);
         }
         sort_bytes_ =
-            std::max(sort_bytes_of(room, key_bits()), sort_bytes_of(num_edges(), core::passes::edge_key_bits));
+            std::max({sort_bytes_of(room, key_bits()), sort_bytes_of(num_named(), core::passes::place_key_bits),
+                      sort_bytes_of(num_edges(), 2 * name_bits())});
         sort_ = memory.take<std::uint8_t>(sort_bytes_);
         terms_ = memory.take<terms_type>(room);
+        names_ = memory.take<std::uint32_t>(num_named() + 1); // one, of vertex 0, for bad indices
         cursors_ = keys_of_.bodies == 1 ? nullptr : memory.take<cursor>(rows_ * keys_of_.bodies);
     }
     [[nodiscard]] bool fits() const {
@@ -174,29 +175,26 @@ public:
             run(mesh.triangles.size() * mesh.copies.count, join, stream);
         }
         const cell_mesh mesh = joined();
-        run(triangles_ + 1, core::passes::count_cells<terms_type>{mesh, num_terms_, counts}, stream);
-        sum_counts(num_terms_, first_term_, static_cast<std::uint32_t>(triangles_ + 1), scan_, scan_bytes_,
+        if (options_.count_open_edges) find_open_edges(stream); // in the arrays that take the records
+        run(triangles_ + 1, count_cell_pixels<terms_type>{mesh, num_pixels_, counts, &state_->list}, stream);
+        sum_counts(num_pixels_, first_pixel_, static_cast<std::uint32_t>(triangles_ + 1), scan_, scan_bytes_,
                    stage::coarse_raster, stream);
-        run(1, bound_cell_records{first_term_ + triangles_, room_, state_}, stream);
-        if (options_.count_open_edges) {
-            run(num_edges(), hash_edges{mesh, keys_[0], order_[0]}, stream);
-            const int at = sort(num_edges(), edge_key_bits, stream);
-            run(num_edges(), count_open_edges{mesh, keys_[at], order_[at], num_edges(), counts}, stream);
-        }
+        const list_cell_pixels<terms_type> list{
+            mesh,      keys_of_, reinterpret_cast<const std::uint64_t*>(first_pixel_), &state_->list, room_, keys_[0],
+            order_[0], terms_};
+        list_cells(list, room_, error, stream);
+        run(1, bound_cell_records{room_, state_}, stream);
         run(room_, fill_cell_keys{&state_->records, static_cast<std::uint64_t>(num_keys_), keys_[0], order_[0]},
             stream);
-        const core::passes::list_cells<terms_type> list{
-            mesh, keys_of_, reinterpret_cast<const std::uint64_t*>(first_term_), keys_[0], order_[0], terms_};
-        run(triangles_, unless_stopped<core::passes::list_cells<terms_type>>{list, error}, stream);
         const int at = sort(room_, key_bits(), stream);
         const record_list<terms_type> records{keys_of_, keys_[at], order_[at], terms_, room_};
         constexpr std::uint64_t safe = std::uint64_t{1} << 19; // triangles whose covers cannot wrap
-        run(rows_ * keys_of_.bodies, measure_rows<terms_type>{records, triangles_ >= safe, counts}, stream);
+        measure_cell_rows(measure_rows<terms_type>{records, triangles_ >= safe, counts}, rows_ * keys_of_.bodies,
+                          stream);
         run(1, stop_large_windings{state_}, stream);
         clear_framebuffer(fb, &state_->call, stream);
         const walk_type walk{records, mesh, shaders_, cursors_, grid_.offset, options_.axis, extent_.x};
-        using shade = shade_cells<cell_shader, Targets...>;
-        run(rows_, unless_stopped<shade>{shade{walk, fb, counts}, error}, stream);
+        shade_cell_rows(shade_cells<cell_shader, Targets...>{walk, fb, counts}, rows_, error, stream);
     }
 
 private:
@@ -204,6 +202,20 @@ private:
         std::uint64_t vertex, triangle;
     };
     [[nodiscard]] std::uint64_t num_edges() const { return options_.count_open_edges ? 3 * triangles_ : 0; }
+    // Vertices whose places get names, and the bits of a name.
+    [[nodiscard]] std::uint64_t num_named() const { return options_.count_open_edges ? vertices_ : 0; }
+    [[nodiscard]] int name_bits() const { return static_cast<int>(std::bit_width(vertices_)); }
+    // As core::cell_scene::count_open_edges, in the arrays that the records are sorted in later.
+    void find_open_edges(cudaStream_t stream) const {
+        using namespace core::passes;
+        const std::uint64_t edges = num_edges();
+        run(vertices_, hash_places{positions_, keys_[0], order_[0]}, stream);
+        int at = sort(vertices_, place_key_bits, stream);
+        run(vertices_, name_places{positions_, keys_[at], order_[at], vertices_, names_}, stream);
+        run(edges, key_edges{indices_, names_, name_bits(), keys_[0], order_[0]}, stream);
+        at = sort(edges, 2 * name_bits(), stream);
+        run(edges, count_unmatched_edges{keys_[at], order_[at], edges, name_bits(), state_->counts}, stream);
+    }
     [[nodiscard]] int key_bits() const {
         return static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys_)));
     }
@@ -246,8 +258,9 @@ private:
     glm::uvec3* indices_ = nullptr;
     std::uint64_t* first_triangle_ = nullptr;
     cell_shader* shaders_ = nullptr;
-    std::uint32_t* num_terms_ = nullptr;
-    unsigned long long* first_term_ = nullptr;
+    std::uint32_t* num_pixels_ = nullptr;
+    unsigned long long* first_pixel_ = nullptr;
+    std::uint32_t* names_ = nullptr; // of the vertices' places
     std::uint8_t *scan_ = nullptr, *sort_ = nullptr;
     std::size_t scan_bytes_ = 0, sort_bytes_ = 0;
     std::uint64_t* keys_[2] = {nullptr, nullptr};
@@ -330,9 +343,9 @@ template <class Mesh, class VertexShader, class CellShader, class... Targets>
     cell_options options;
     options.count_voxels = state.counts_voxels != 0;
     const std::vector<std::uint64_t> counts(std::begin(state.counts), std::end(state.counts));
-    const status s = core::make_cell_status(counts, options, state.triangles_in, state.all_records);
+    const status s = core::make_cell_status(counts, options, state.triangles_in, std::uint64_t{state.list.num_terms});
     if (!s.ok() || (state.call.index_error & device::stopped) == 0) return s;
-    if (need != nullptr) need->records = std::max(workspace.limits.records, state.all_records);
+    if (need != nullptr) need->records = std::max(workspace.limits.records, std::uint64_t{state.list.num_terms});
     status failed = core::failure(status_code::capacity_exceeded, stage::coarse_raster);
     failed.counts.triangles_in = state.triangles_in;
     return failed;

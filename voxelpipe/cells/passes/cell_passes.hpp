@@ -5,6 +5,7 @@
 // voxelize_cells on any backend: list the terms of all triangles, sort them by row and voxel, sum and shade the rows.
 
 #include <voxelpipe/cells/passes/cell_walk.hpp>
+#include <voxelpipe/core/row_passes.hpp>
 #include <voxelpipe/programs/passes/fragment_pool.hpp>
 #include <voxelpipe/solid/core/holes.hpp>
 #include <voxelpipe/surfaces/passes/mesh_rows.hpp>
@@ -268,6 +269,25 @@ private:
     return s;
 }
 
+// A backend whose threads can keep items before their number is known.
+template <class Backend>
+inline constexpr bool has_collect = requires(Backend& b) {
+    b.template collect<int>(std::uint64_t{0}, [](std::uint64_t, const auto&) {});
+};
+
+// True of a backend that lists terms in its own way, by passes::list_terms_by_pixel(backend, mesh of the scene, keys,
+// counts, term_room).
+template <class Backend>
+inline constexpr bool lists_by_pixel = false;
+
+// The arrays of a call's terms, which are as long as they have to be, or longer.
+template <class Backend, class Terms>
+struct term_room {
+    typename Backend::template buffer<std::uint64_t>& keys;
+    typename Backend::template buffer<std::uint32_t>& order;
+    typename Backend::template buffer<Terms>& terms;
+};
+
 // The terms of a call's triangles by row and voxel, and what shades them.
 template <class Backend, class CellShader>
 class listed_cells {
@@ -284,7 +304,7 @@ public:
                  std::uint64_t triangles_in)
         : backend_(backend), options_(options), triangles_in_(triangles_in), num_draws_(draws.size()),
           offset_(g.offset), scene_(backend, draws, g, options.axis), keys_(backend, 0), order_(backend, 0),
-          terms_(backend, 0), shaders_(backend, 0), cursors_(backend, 0) {
+          sizes_(backend, 0), terms_(backend, 0), shaders_(backend, 0), cursors_(backend, 0) {
         std::vector<CellShader> shaders;
         for (const auto& d : draws) shaders.push_back(d.fragment_shader);
         shaders_ = buffer<CellShader>(backend, array_view<const CellShader>(shaders.data(), shaders.size()));
@@ -292,6 +312,7 @@ public:
 
     // Closes holes, then lists and sorts. Throws what the backend's buffers throw.
     [[nodiscard]] status list() {
+        if (scene_.num_vertices() == 0) return result(); // bad indices, of which none is a vertex's
         if (options_.repair == repair::close_holes) {
             if (options_.cones != nullptr)
                 scene_.close_holes(options_.cones, options_.bodies == bodies::call ? 1 : num_draws_, holes_);
@@ -307,29 +328,20 @@ public:
         const uint128 num_keys = static_cast<uint128>(num_rows()) * keys_of_.bodies * keys_of_.slots;
         if (num_keys >> 63 != 0) return fail(status_code::size_overflow);
 
-        buffer<std::uint64_t> first_term(backend_, triangles + 1);
-        std::uint64_t count = 0;
-        {
-            buffer<std::uint32_t> num_terms(backend_, triangles + 1);
-            backend_.for_each(triangles + 1,
-                              passes::count_cells<terms_type>{scene_.mesh(), num_terms.data(), scene_.counts()});
-            count = backend_.sum(num_terms, first_term);
-        }
         if (finds_edges) scene_.count_open_edges();
-        if (count >= most) return fail(status_code::out_of_memory);
-        keys_ = buffer<std::uint64_t>(backend_, count);
-        order_ = buffer<std::uint32_t>(backend_, count);
-        terms_ = buffer<terms_type>(backend_, count);
-        backend_.for_each(triangles, passes::list_cells<terms_type>{scene_.mesh(), keys_of_, first_term.data(),
-                                                                    keys_.data(), order_.data(), terms_.data()});
-        backend_.sort_by_key(keys_, order_, static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys))));
+        if (!list_terms(triangles)) return fail(status_code::out_of_memory);
+        const int bits = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys)));
+        if constexpr (lists_by_pixel<Backend>)
+            backend_.sort_by_key(keys_, order_, bits, num_records_);
+        else
+            backend_.sort_by_key(keys_, order_, bits);
         return {};
     }
     // Looks at the sums of the rows of the grid, or of `count` listed ones.
     [[nodiscard]] status measure(std::uint64_t count, const std::uint64_t* rows = nullptr) {
-        constexpr std::uint64_t safe = std::uint64_t{1} << 19; // triangles whose covers cannot wrap
-        backend_.for_each(count * keys_of_.bodies,
-                          passes::measure_rows<terms_type>{terms(), scene_.num_triangles() >= safe, counts(), rows});
+        for_each_row(backend_, count * keys_of_.bodies,
+                     passes::measure_rows<terms_type>{terms(), checks_size(), counts(), rows,
+                                                      sizes_.size() == 0 ? nullptr : sizes_.data()});
         return result();
     }
     // What goes along rows, of which there are `places` at a time.
@@ -342,7 +354,7 @@ public:
 
     // The status so far: of a call that has succeeded, or what failed.
     [[nodiscard]] status result() const {
-        status s = make_cell_status(scene_.read_counts(), options_, triangles_in_, terms_.size());
+        status s = make_cell_status(scene_.read_counts(), options_, triangles_in_, num_records_);
         s.cells.hole_edges = s.ok() ? holes_.hole_edges : 0;
         s.cells.holes = s.ok() ? holes_.holes : 0;
         s.cells.cones = s.ok() ? holes_.cones : 0;
@@ -353,7 +365,8 @@ public:
     }
     [[nodiscard]] std::uint64_t* counts() { return scene_.counts(); }
     [[nodiscard]] passes::record_list<terms_type> terms() {
-        return {keys_of_, keys_.data(), order_.data(), terms_.data(), terms_.size()};
+        return {keys_of_, keys_.data(), order_.data(), terms_.data(),
+                lists_by_pixel<Backend> ? num_records_ : terms_.size()};
     }
     [[nodiscard]] status fail(status_code code) const {
         status s = failure(code, stage::coarse_raster);
@@ -364,6 +377,50 @@ public:
     static constexpr std::uint64_t most = std::uint64_t{1} << 32; // vertices, edges and terms are numbered in 32 bits
 
 private:
+    // Lists the terms of all triangles. False if they cannot be numbered.
+    [[nodiscard]] bool list_terms(std::uint64_t triangles) {
+        if constexpr (has_collect<Backend>) {
+            using record = passes::cell_record<terms_type>;
+            auto records = backend_.template collect<record>(
+                triangles, passes::collect_cells<terms_type>{scene_.mesh(), keys_of_, scene_.counts()});
+            if (!make_room(records.size())) return false;
+            if (checks_size()) sizes_ = buffer<std::uint32_t>(backend_, records.size());
+            num_records_ = records.num_added();
+            backend_.take(std::move(records),
+                          passes::store_record<terms_type>{keys_.data(), order_.data(),
+                                                           checks_size() ? sizes_.data() : nullptr, terms_.data()});
+        } else if constexpr (lists_by_pixel<Backend>) {
+            num_records_ = list_terms_by_pixel(backend_, scene_.mesh(), keys_of_, scene_.counts(),
+                                               term_room<Backend, terms_type>{keys_, order_, terms_});
+            return num_records_ < most;
+        } else {
+            buffer<std::uint64_t> first_term(backend_, triangles + 1);
+            std::uint64_t count = 0;
+            {
+                buffer<std::uint32_t> num_terms(backend_, triangles + 1);
+                backend_.for_each(triangles + 1,
+                                  passes::count_cells<terms_type>{scene_.mesh(), num_terms.data(), scene_.counts()});
+                count = backend_.sum(num_terms, first_term);
+            }
+            if (!make_room(count)) return false;
+            backend_.for_each(triangles, passes::list_cells<terms_type>{scene_.mesh(), keys_of_, first_term.data(),
+                                                                        keys_.data(), order_.data(), terms_.data()});
+        }
+        return true;
+    }
+    [[nodiscard]] bool checks_size() const {
+        constexpr std::uint64_t safe = std::uint64_t{1} << 19; // triangles whose covers cannot wrap
+        return scene_.num_triangles() >= safe;
+    }
+    [[nodiscard]] bool make_room(std::uint64_t count) {
+        if (count >= most) return false;
+        num_records_ = count;
+        keys_ = buffer<std::uint64_t>(backend_, count);
+        order_ = buffer<std::uint32_t>(backend_, count);
+        terms_ = buffer<terms_type>(backend_, count);
+        return true;
+    }
+
     Backend& backend_;
     cell_options options_;
     std::uint64_t triangles_in_, num_draws_;
@@ -372,9 +429,10 @@ private:
     cell_counters holes_;
     passes::cell_keys keys_of_{};
     buffer<std::uint64_t> keys_;
-    buffer<std::uint32_t> order_;
+    buffer<std::uint32_t> order_, sizes_; // sizes: of terms that stand for several
     buffer<terms_type> terms_;
-    buffer<CellShader> shaders_; // of the bodies
+    std::uint64_t num_records_ = 0; // pairs of a triangle and a voxel
+    buffer<CellShader> shaders_;    // of the bodies
     buffer<typename walk_type::cursor> cursors_;
 };
 
@@ -398,8 +456,8 @@ template <class Backend, class Mesh, class VertexShader, class CellShader, class
     if (const status s = cells.list(); !s.ok()) return s;
     if (const status s = cells.measure(cells.num_rows()); !s.ok()) return s;
     if (const status begun = begin_fold(backend, fb); !begun.ok()) return begun;
-    backend.for_each(cells.num_rows(),
-                     passes::shade_cells<CellShader, Targets...>{cells.walk(cells.num_rows()), fb, cells.counts()});
+    for_each_row(backend, cells.num_rows(),
+                 passes::shade_cells<CellShader, Targets...>{cells.walk(cells.num_rows()), fb, cells.counts()});
     return cells.result();
 }
 

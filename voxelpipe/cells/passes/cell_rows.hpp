@@ -44,6 +44,15 @@ VOXELPIPE_HD triangle_class visit_cells(const cell_mesh& mesh, std::uint64_t i, 
     return kind;
 }
 
+// Counts a triangle that is not drawn. Cones are nobody's triangles.
+VOXELPIPE_HD inline void count_triangle(const cell_mesh& mesh, std::uint64_t i, triangle_class kind,
+                                        std::uint64_t* counts) {
+    if (i >= mesh.num_drawn) return;
+    if (kind == triangle_class::nonfinite) add_count(counts, cell_count::nonfinite, 1);
+    if (kind == triangle_class::too_far) add_count(counts, cell_count::too_far, 1);
+    if (kind == triangle_class::outside) add_count(counts, cell_count::outside, 1);
+}
+
 // The number of a triangle's terms; 0 behind the last triangle, for the sums.
 template <class Terms>
 struct count_cells {
@@ -60,13 +69,26 @@ struct count_cells {
                 n += static_cast<std::uint32_t>(n != ~0u);
             });
         num_terms[i] = n;
-        if (i >= mesh.num_drawn) return; // cones are nobody's triangles
-        if (kind == triangle_class::nonfinite) add_count(counts, cell_count::nonfinite, 1);
-        if (kind == triangle_class::too_far) add_count(counts, cell_count::too_far, 1);
-        if (kind == triangle_class::outside) add_count(counts, cell_count::outside, 1);
+        count_triangle(mesh, i, kind, counts);
     }
 };
 
+// Calls emit(key, terms) for a triangle's terms.
+VOXELPIPE_ANY_CALLABLE
+template <class Terms, class Emit>
+VOXELPIPE_HD triangle_class emit_cells(const cell_mesh& mesh, const cell_keys& keys_of, std::uint64_t i, Emit&& emit) {
+    const std::uint64_t body = keys_of.bodies == 1 ? 0 : mesh.draw_of(i);
+    VOXELPIPE_CALLS_ANY
+    const auto visit = [&](std::uint64_t y, std::uint64_t z, std::uint64_t slot, const Terms& of_voxel) {
+        Terms terms = of_voxel;
+        if constexpr (has_sheets<Terms>) terms.triangle = static_cast<std::uint32_t>(i);
+        emit(keys_of.key(y, z, body, slot), terms);
+    };
+    VOXELPIPE_CALLS_ANY_END
+    return visit_cells<false, Terms>(mesh, i, visit);
+}
+
+// Stores the terms of counted triangles.
 template <class Terms>
 struct list_cells {
     cell_mesh mesh;
@@ -79,16 +101,76 @@ struct list_cells {
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         std::uint64_t to = first_term[i];
         if (first_term[i + 1] == to) return;
-        const std::uint64_t body = keys_of.bodies == 1 ? 0 : mesh.draw_of(i);
-        visit_cells<false, Terms>(mesh, i,
-                                  [&](std::uint64_t y, std::uint64_t z, std::uint64_t slot, const Terms& of_voxel) {
-                                      keys[to] = keys_of.key(y, z, body, slot);
-                                      order[to] = static_cast<std::uint32_t>(to);
-                                      terms[to] = of_voxel;
-                                      if constexpr (has_sheets<Terms>)
-                                          terms[to].triangle = static_cast<std::uint32_t>(i);
-                                      ++to;
-                                  });
+        emit_cells<Terms>(mesh, keys_of, i, [&](std::uint64_t key, const Terms& of_voxel) {
+            keys[to] = key;
+            order[to] = static_cast<std::uint32_t>(to);
+            terms[to] = of_voxel;
+            ++to;
+        });
+    }
+};
+
+// |cover| in units of 2^-20, rounded up.
+[[nodiscard]] VOXELPIPE_HD inline std::uint64_t size_of_cover(std::int64_t cover) {
+    return (static_cast<std::uint64_t>(cover < 0 ? -cover : cover) + 0xffffffu) >> 24;
+}
+
+// The same where a backend's threads keep items until all of them are counted (Backend::collect): nothing is counted
+// first, and the terms of a voxel that one block of triangles has become one. At most 1024 triangles are a block.
+template <class Terms>
+struct cell_record {
+    std::uint64_t key;
+    Terms terms;
+    std::uint32_t size; // of the covers, at most 2^20 each
+
+    void merge(const cell_record& other) requires(!has_sheets<Terms>) { // which need all triangles
+        size += other.size;
+        const auto add = [](std::int64_t& to, std::int64_t v) { // sums may wrap on their way
+            to = static_cast<std::int64_t>(static_cast<std::uint64_t>(to) + static_cast<std::uint64_t>(v));
+        };
+        const Terms& t = other.terms;
+        add(terms.cover, t.cover);
+        add(terms.volume, t.volume);
+        if constexpr (has_moments<Terms>) {
+            add(terms.cover_y, t.cover_y);
+            add(terms.cover_z, t.cover_z);
+            add(terms.volume_x, t.volume_x);
+            add(terms.volume_y, t.volume_y);
+            add(terms.volume_z, t.volume_z);
+        }
+        if constexpr (has_areas<Terms>) { // of a triangle less than 2^45, so these do not wrap
+            add(terms.area, t.area);
+            add(terms.area_x, t.area_x);
+            add(terms.area_y, t.area_y);
+            add(terms.area_z, t.area_z);
+        }
+    }
+};
+template <class Terms>
+struct collect_cells {
+    cell_mesh mesh;
+    cell_keys keys_of;
+    std::uint64_t* counts;
+
+    template <class Add>
+    void operator()(std::uint64_t i, const Add& add) const {
+        const triangle_class kind = emit_cells<Terms>(mesh, keys_of, i, [&](std::uint64_t key, const Terms& terms) {
+            add(cell_record<Terms>{key, terms, static_cast<std::uint32_t>(size_of_cover(terms.cover))});
+        });
+        count_triangle(mesh, i, kind, counts);
+    }
+};
+template <class Terms>
+struct store_record {
+    std::uint64_t* keys;
+    std::uint32_t *order, *sizes;
+    Terms* terms;
+
+    void operator()(std::uint64_t to, const cell_record<Terms>& r) const {
+        keys[to] = r.key;
+        order[to] = static_cast<std::uint32_t>(to);
+        terms[to] = r.terms;
+        if (sizes != nullptr) sizes[to] = r.size;
     }
 };
 
@@ -98,16 +180,17 @@ struct measure_rows {
     record_list<Terms> list;
     bool checks_size;
     std::uint64_t* counts;
-    const std::uint64_t* rows = nullptr; // of the grid
+    const std::uint64_t* rows = nullptr;  // of the grid
+    const std::uint32_t* sizes = nullptr; // of merged terms; null: of each term's cover
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         if (rows != nullptr) i = rows[i / list.keys_of.bodies] * list.keys_of.bodies + i % list.keys_of.bodies;
         const std::uint64_t end_key = (i + 1) * list.keys_of.slots;
-        std::uint64_t sum = 0, size = 0; // size in units of 2^-20, each term rounded up
+        std::uint64_t sum = 0, size = 0;
         for (std::uint64_t at = list.find(i * list.keys_of.slots); at < list.count && list.keys[at] < end_key; ++at) {
             const std::int64_t cover = list.terms[list.order[at]].cover;
             sum += static_cast<std::uint64_t>(cover);
-            size += (static_cast<std::uint64_t>(cover < 0 ? -cover : cover) + 0xffffffu) >> 24;
+            size += sizes != nullptr ? sizes[list.order[at]] : size_of_cover(cover);
         }
         if (sum != 0) add_count(counts, cell_count::open_rows, 1);
         if (checks_size && size > std::uint64_t{1} << 38) add_count(counts, cell_count::too_large, 1);

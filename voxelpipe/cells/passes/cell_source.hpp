@@ -112,85 +112,12 @@ struct join_triangles {
 
 // ---- open edges -----------------------------------------------------------------------------------------------------
 
-// An edge by its ends in lexicographic order. direction: 1, or -1 if the triangle runs the other way, 0 without length.
-struct snapped_edge {
-    snapped_position a, b;
-    int direction;
-};
 [[nodiscard]] VOXELPIPE_HD inline bool is_same_place(const snapped_position& a, const snapped_position& b) {
     return a.x == b.x && a.y == b.y && a.z == b.z;
 }
-// Edge i % 3 of triangle i / 3.
-[[nodiscard]] VOXELPIPE_HD inline snapped_edge edge_of(const cell_mesh& m, std::uint64_t i) {
-    const std::uint64_t t = i / 3;
-    const int e = static_cast<int>(i % 3);
-    const snapped_position a = m.corner(t, e), b = m.corner(t, e == 2 ? 0 : e + 1), c = m.corner(t, e == 0 ? 2 : e - 1);
-    if (classify_positions(a, b, c) != triangle_class::drawn || is_same_place(a, b)) return {a, b, 0};
-    return is_before(a, b) ? snapped_edge{a, b, 1} : snapped_edge{b, a, -1};
-}
 
-inline constexpr int edge_key_bits = 39; // three passes of the CPU's sort; equal keys are compared exactly
-inline constexpr std::uint64_t no_edge = (std::uint64_t{1} << edge_key_bits) - 1;
-
-struct hash_edges {
-    cell_mesh mesh;
-    std::uint64_t* keys;
-    std::uint32_t* order;
-
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const snapped_edge e = edge_of(mesh, i);
-        order[i] = static_cast<std::uint32_t>(i);
-        std::uint64_t h = 0;
-        const auto mix = [&](std::int64_t v) {
-            h = (h ^ static_cast<std::uint64_t>(v)) * 0x9e3779b97f4a7c15u;
-            h ^= h >> 29;
-        };
-        mix(e.a.x);
-        mix(e.a.y);
-        mix(e.a.z);
-        mix(e.b.x);
-        mix(e.b.y);
-        mix(e.b.z);
-        h = h * 0xbf58476d1ce4e5b9u >> (64 - edge_key_bits);
-        keys[i] = e.direction == 0 ? no_edge : h == no_edge ? 0 : h;
-    }
-};
-
-// Adds up the directions of equal edges, at the first of each run of equal keys.
-struct count_open_edges {
-    cell_mesh mesh;
-    const std::uint64_t* keys;
-    const std::uint32_t* order;
-    std::uint64_t count;
-    std::uint64_t* counts;
-
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        if (keys[i] == no_edge || (i != 0 && keys[i] == keys[i - 1])) return;
-        std::uint64_t end = i + 1, open = 0;
-        while (end < count && keys[end] == keys[i]) ++end;
-        const auto equal = [](const snapped_edge& e, const snapped_edge& f) {
-            return is_same_place(e.a, f.a) && is_same_place(e.b, f.b);
-        };
-        const snapped_edge first = edge_of(mesh, order[i]);
-        for (std::uint64_t at = i; at < end; ++at) {
-            const snapped_edge e = edge_of(mesh, order[at]);
-            bool was_met = at != i && equal(e, first);
-            for (std::uint64_t before = i + 1; before < at && !was_met; ++before)
-                was_met = equal(e, edge_of(mesh, order[before]));
-            if (was_met) continue;
-            std::int64_t sum = 0;
-            for (std::uint64_t other = at; other < end; ++other) {
-                const snapped_edge f = edge_of(mesh, order[other]);
-                if (equal(e, f)) sum += f.direction;
-            }
-            open += static_cast<std::uint64_t>(sum < 0 ? -sum : sum);
-        }
-        add_count(counts, cell_count::open_edges, open);
-    }
-};
-
-// Where memory may be taken as it is needed, vertices get the names of their places first: edges are pairs of names
-// then, and equal ones are found without a look at the vertices.
+// Vertices get the names of their places first: edges are pairs of names then, and equal ones are found without a look
+// at the vertices.
 
 inline constexpr int place_key_bits = 39;
 inline constexpr std::uint32_t no_place = ~std::uint32_t{0}; // of a vertex that cannot be drawn

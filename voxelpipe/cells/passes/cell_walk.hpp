@@ -102,45 +102,100 @@ struct cell_walk {
         }
     }
 
+    // Shades voxels for a body: the one at `at` and those behind it up to `end`, which differ in their place alone;
+    // none whose sums are 0. aperture: before them; behind: the end of their terms. Sets is_drawn where it is the first
+    // fragment that is kept.
+    VOXELPIPE_ANY_CALLABLE
+    template <class Visit>
+    VOXELPIPE_HD void shade_body(std::uint64_t body, const glm::ivec3& at, int end,
+                                 const typename cursor::slot_sums& sums, std::int64_t aperture, std::uint64_t behind,
+                                 bool& is_drawn, cell_tally& tally, Visit& visit) const {
+        constexpr std::int64_t unit = std::int64_t{1} << cell_unit_bits, margin = std::int64_t{1} << 20;
+        const auto n = static_cast<std::uint64_t>(end - at.x);
+        const auto units = static_cast<std::int64_t>(static_cast<std::uint64_t>(aperture) + sums.volume);
+        if (!sums.has_any && units == 0) return;
+        const auto next = static_cast<std::int64_t>(static_cast<std::uint64_t>(aperture) + sums.cover);
+        const glm::ivec3 p = place_in_part(at.x, at.y, at.z, axis);
+        tally.cut += sums.has_any ? n : 0;
+        tally.below += units < -margin ? n : 0;
+        tally.above += units > unit + margin ? n : 0;
+        tally.volume += static_cast<int128>(units) * static_cast<std::int64_t>(n);
+        fragment f{};
+        static_cast<cell_fragment&>(f) = {
+            p + offset, static_cast<std::uint32_t>(body), sums.has_any, to_fraction(units), units, aperture, next};
+        tally.lost += measure_cell(mesh, list, axis, at, behind, sums, f) ? 0 : n;
+        const auto out = shaders[body](f);
+        if (!out.keep) {
+            tally.discarded += n;
+            return;
+        }
+        tally.fragments += n;
+        if (!is_drawn) visit.begin(p);
+        is_drawn = true;
+        visit.add(out.values);
+    }
+
 private:
     // at: the first voxel along the rows and the two other axes.
     VOXELPIPE_ANY_CALLABLE
     template <class Visit>
     VOXELPIPE_HD void shade(cursor* all, std::uint64_t first, const glm::ivec3& at, int end, cell_tally& tally,
                             Visit& visit) const {
-        constexpr std::int64_t unit = std::int64_t{1} << cell_unit_bits, margin = std::int64_t{1} << 20;
-        const auto n = static_cast<std::uint64_t>(end - at.x);
-        const glm::ivec3 p = place_in_part(at.x, at.y, at.z, axis);
         bool is_drawn = false;
         for (std::uint64_t b = 0; b < list.keys_of.bodies; ++b) {
             all[b].next_key = (first + b) * list.keys_of.slots + static_cast<std::uint64_t>(at.x) + 1;
             const auto sums = all[b].take(list);
             const std::int64_t aperture = all[b].aperture;
-            const auto units = static_cast<std::int64_t>(static_cast<std::uint64_t>(aperture) + sums.volume);
-            const auto next = static_cast<std::int64_t>(static_cast<std::uint64_t>(aperture) + sums.cover);
-            all[b].aperture = next;
-            if (!sums.has_any && units == 0) continue;
-            tally.cut += sums.has_any ? n : 0;
-            tally.below += units < -margin ? n : 0;
-            tally.above += units > unit + margin ? n : 0;
-            tally.volume += static_cast<int128>(units) * static_cast<std::int64_t>(n);
-            fragment f{};
-            static_cast<cell_fragment&>(f) = {
-                p + offset, static_cast<std::uint32_t>(b), sums.has_any, to_fraction(units), units, aperture, next};
-            tally.lost += measure_cell(mesh, list, axis, at, all[b].at, sums, f) ? 0 : n;
-            const auto out = shaders[b](f);
-            if (!out.keep) {
-                tally.discarded += n;
-                continue;
-            }
-            tally.fragments += n;
-            if (!is_drawn) visit.begin(p);
-            is_drawn = true;
-            visit.add(out.values);
+            all[b].aperture = static_cast<std::int64_t>(static_cast<std::uint64_t>(aperture) + sums.cover);
+            shade_body(b, at, end, sums, aperture, all[b].at, is_drawn, tally, visit);
         }
         if (!is_drawn) return;
-        visit.end(p, at.x, end);
-        tally.voxels += n;
+        visit.end(place_in_part(at.x, at.y, at.z, axis), at.x, end);
+        tally.voxels += static_cast<std::uint64_t>(end - at.x);
+    }
+};
+
+// A voxel, or a run of voxels, that takes fragments for a framebuffer.
+template <class... Targets>
+struct blended_voxel {
+    const framebuffer_view<Targets...>& fb;
+    int axis; // that runs lie along
+    // What the targets sum a voxel's fragments in, which is rounded once.
+    pack<decltype(Targets::traits::begin(typename Targets::value_type{}))...> sums;
+
+    VOXELPIPE_HD void begin(const glm::ivec3& p) {
+        for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            using target_type = typename pack_element<I, Targets...>::type;
+            using map = typename target_type::map;
+            const auto& t = voxelpipe::get<I>(fb.targets);
+            if (t.load == load_operation::off) return;
+            if constexpr (map::is_bit) // other rows may change other bits of the word
+                voxelpipe::get<I>(sums) = target_type::traits::begin(
+                    (load_shared(t.elements[map::cell(t.extent, p.x, p.y, p.z)]) >> (p.x & 31) & 1u) != 0);
+            else
+                voxelpipe::get<I>(sums) = target_type::traits::begin(map::load(t.elements, t.extent, p.x, p.y, p.z));
+        });
+    }
+    template <class Values>
+    VOXELPIPE_HD void add(const Values& values) {
+        for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            pack_element<I, Targets...>::type::traits::apply(voxelpipe::get<I>(sums), voxelpipe::get<I>(values));
+        });
+    }
+    VOXELPIPE_HD void end(const glm::ivec3& p, int first, int last) const {
+        for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
+            using target_type = typename pack_element<I, Targets...>::type;
+            using map = typename target_type::map;
+            const auto& t = voxelpipe::get<I>(fb.targets);
+            if (t.load == load_operation::off) return;
+            const auto value = target_type::traits::end(voxelpipe::get<I>(sums));
+            glm::ivec3 at = p;
+            for (int i = first; i < last; ++i, ++at[axis])
+                if constexpr (map::is_bit)
+                    store_shared(t.elements[map::cell(t.extent, at.x, at.y, at.z)], 1u << (at.x & 31), value);
+                else
+                    map::store(t.elements, t.extent, at.x, at.y, at.z, value);
+        });
     }
 };
 
@@ -154,7 +209,7 @@ struct shade_cells {
     VOXELPIPE_ANY_CALLABLE
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         cell_tally tally;
-        blended_voxel voxel{fb, walk.axis, {}};
+        blended_voxel<Targets...> voxel{fb, walk.axis, {}};
         bool goes_by_runs = false; // whose voxels had one value before, and get one
         if constexpr (ignores_voxel<CellShader>) goes_by_runs = is_cleared();
         if constexpr (ignores_voxel<CellShader>)
@@ -170,48 +225,6 @@ private:
             [&]<std::size_t I>() { all = all && voxelpipe::get<I>(fb.targets).load != load_operation::load; });
         return all;
     }
-    struct blended_voxel {
-        const framebuffer_view<Targets...>& fb;
-        int axis; // that runs lie along
-        // What the targets sum a voxel's fragments in, which is rounded once.
-        pack<decltype(Targets::traits::begin(typename Targets::value_type{}))...> sums;
-
-        VOXELPIPE_HD void begin(const glm::ivec3& p) {
-            for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-                using target_type = typename pack_element<I, Targets...>::type;
-                using map = typename target_type::map;
-                const auto& t = voxelpipe::get<I>(fb.targets);
-                if (t.load == load_operation::off) return;
-                if constexpr (map::is_bit) // other rows may change other bits of the word
-                    voxelpipe::get<I>(sums) = target_type::traits::begin(
-                        (load_shared(t.elements[map::cell(t.extent, p.x, p.y, p.z)]) >> (p.x & 31) & 1u) != 0);
-                else
-                    voxelpipe::get<I>(sums) =
-                        target_type::traits::begin(map::load(t.elements, t.extent, p.x, p.y, p.z));
-            });
-        }
-        template <class Values>
-        VOXELPIPE_HD void add(const Values& values) {
-            for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-                pack_element<I, Targets...>::type::traits::apply(voxelpipe::get<I>(sums), voxelpipe::get<I>(values));
-            });
-        }
-        VOXELPIPE_HD void end(const glm::ivec3& p, int first, int last) const {
-            for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
-                using target_type = typename pack_element<I, Targets...>::type;
-                using map = typename target_type::map;
-                const auto& t = voxelpipe::get<I>(fb.targets);
-                if (t.load == load_operation::off) return;
-                const auto value = target_type::traits::end(voxelpipe::get<I>(sums));
-                glm::ivec3 at = p;
-                for (int i = first; i < last; ++i, ++at[axis])
-                    if constexpr (map::is_bit)
-                        store_shared(t.elements[map::cell(t.extent, at.x, at.y, at.z)], 1u << (at.x & 31), value);
-                    else
-                        map::store(t.elements, t.extent, at.x, at.y, at.z, value);
-            });
-        }
-    };
 };
 
 } // namespace voxelpipe::core::passes

@@ -202,6 +202,7 @@ template <class Backend, class Mesh, class VertexShader, class Shader>
     using words = typename Backend::template buffer<std::uint32_t>;
     using numbers = typename Backend::template buffer<std::uint64_t>;
     cell_scene<Backend> scene(backend, draws, g, 0);
+    if (scene.num_vertices() == 0) return make_cell_status(scene.read_counts(), {}, triangles_in, 0); // bad indices
     passes::list_links list{scene.mesh(), keys_of, nullptr, nullptr, nullptr, nullptr, scene.counts()};
     numbers first(backend, triangles_in + 1);
     std::uint64_t count = 0;

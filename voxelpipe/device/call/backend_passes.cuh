@@ -76,7 +76,11 @@ public:
     // Sorts pairs by the lowest `bits` bits of the key, stably.
     template <int = 0>
     void sort_by_key(buffer<std::uint64_t>& keys, buffer<std::uint32_t>& values, int bits) {
-        const std::size_t n = keys.size();
+        sort_by_key(keys, values, bits, keys.size());
+    }
+    // Sorts the first n pairs, which alone are kept.
+    template <int = 0>
+    void sort_by_key(buffer<std::uint64_t>& keys, buffer<std::uint32_t>& values, int bits, std::size_t n) {
         if (n < 2) return;
         buffer<std::uint64_t> other_keys(*this, n);
         buffer<std::uint32_t> other_values(*this, n);

@@ -40,6 +40,8 @@ struct distance_workspace_view {
     void* memory = nullptr; // on the device, aligned to 256 bytes
     std::size_t bytes = 0;  // at least distance_workspace_bytes(...)
     distance_limits limits; // that `bytes` was computed for
+    // As workspace_view::stop.
+    const unsigned int* stop = nullptr;
 };
 
 namespace device {
@@ -63,27 +65,33 @@ class async_distance<draw<Mesh, VertexShader, Shader>> {
 public:
     using draw_type = draw<Mesh, VertexShader, Shader>;
 
+    // lists_rows: the samples of the band become lists.
     async_distance(std::span<const draw_type> draws, const grid& samples, const distance_options& options,
-                   std::uint64_t triangles, const distance_limits& limits)
-        : search_{draws,   samples, options, static_cast<std::uint32_t>(triangles), to_capacities(limits),
-                  nullptr, false} {
+                   std::uint64_t triangles, const distance_limits& limits, bool lists_rows)
+        : search_{draws,   samples,   options, static_cast<std::uint32_t>(triangles), to_capacities(limits),
+                  nullptr, lists_rows} {
         if (options.sign == distance_sign::none || triangles == 0) return;
         for (const draw_type& d : draws) solids_.push_back({d.mesh, d.vertex_shader, constant(true)});
     }
 
     [[nodiscard]] bool fits() const { return search_.fits() && (solids_.empty() || solid(nullptr).entries.fits()); }
-    [[nodiscard]] std::size_t bytes() const {
-        arena plan;
-        (void)search_.take(plan);
-        if (!solids_.empty()) (void)take_solid(plan);
-        return plan.used();
+    // Takes what launch() takes.
+    void plan(arena& memory) const {
+        (void)search_.take(memory);
+        if (!solids_.empty()) (void)take_solid(memory);
     }
-    // Launches everything into `memory`, of bytes().
-    template <class Framebuffer>
-    void launch(void* memory, const Framebuffer& fb, cudaStream_t stream) const {
-        arena carved(memory);
+    [[nodiscard]] std::size_t bytes() const {
+        arena memory;
+        plan(memory);
+        return memory.used();
+    }
+    // Takes memory, the search's state first, and launches the search and the solid; then calls finish(call, its
+    // memory, shading, inside_rows), which launches the rest. stop: workspace_view::stop.
+    template <class Finish>
+    void launch(arena& carved, const unsigned int* stop, cudaStream_t stream, const Finish& finish) const {
         auto m = search_.take(carved);
         check(cudaMemsetAsync(m.state, 0, sizeof(pipeline_state), stream));
+        take_stop({nullptr, 0, {}, stop}, m.state, stream);
         check_subsets(search_.draws, &m.state->index_error, stream);
         inside_rows inside{nullptr, glm::ivec3(0)};
         if (!solids_.empty()) {
@@ -98,7 +106,7 @@ public:
             inside = {s.bits, search_.samples.extent};
         }
         const auto shading = search_.search(m, stream);
-        shade_into(search_, m, shading, inside, fb, stream);
+        finish(search_, m, shading, inside);
     }
 
 private:
@@ -149,7 +157,7 @@ template <class Mesh, class VertexShader, class DistanceShader, class... Targets
     if (draws.empty()) return sizeof(device::pipeline_state);
     return device::bytes_or_none([&]() -> std::size_t {
         const device::async_distance<draw<Mesh, VertexShader, DistanceShader>> call(
-            draws, core::sample_grid(g, options.sample), options, s.counts.triangles_in, limits);
+            draws, core::sample_grid(g, options.sample), options, s.counts.triangles_in, limits, false);
         return call.fits() ? call.bytes() : 0;
     });
 }
@@ -177,10 +185,17 @@ voxelize_distance_async(cuda_backend& backend, std::span<const draw<Mesh, Vertex
                 return s;
             }
             if (draws.empty())
-                return device::clear_async(backend, fb, {workspace.memory, workspace.bytes, {}, nullptr});
+                return device::clear_async(backend, fb, {workspace.memory, workspace.bytes, {}, workspace.stop});
             const device::async_distance<draw<Mesh, VertexShader, DistanceShader>> call(
-                draws, samples, options, s.counts.triangles_in, workspace.limits);
-            device::launch_until(stage::tile_resolve, [&] { call.launch(workspace.memory, fb, backend.stream); });
+                draws, samples, options, s.counts.triangles_in, workspace.limits, false);
+            device::launch_until(stage::tile_resolve, [&] {
+                device::arena memory(workspace.memory);
+                call.launch(
+                    memory, workspace.stop, backend.stream,
+                    [&](const auto& search, const auto& m, const auto& shading, const device::inside_rows& inside) {
+                        device::shade_into(search, m, shading, inside, fb, backend.stream);
+                    });
+            });
             return s;
         });
     } else {
@@ -188,25 +203,42 @@ voxelize_distance_async(cuda_backend& backend, std::span<const draw<Mesh, Vertex
     }
 }
 
-// Waits for the stream and returns the status of the last call in this workspace, that of voxelize_distance. `need` may
-// be null. Where something did not fit (capacity_exceeded), *need receives larger limits; a call whose parts did not
-// fit has not counted all pairs and bricks, so that the same call may fail once more with these.
-[[nodiscard]] inline status read_distance_status(cuda_backend& backend, const distance_workspace_view& workspace,
-                                                 distance_limits* need = nullptr) {
-    const distance_limits& l = workspace.limits;
+namespace device {
+
+// The same numbers as read_status has them.
+[[nodiscard]] inline workspace_limits to_workspace_limits(const distance_limits& l) {
     workspace_limits limits;
     limits.tile_pairs = l.pairs;
     limits.tile_records = l.parts;
     limits.fragments = l.crossings;
     limits.fragment_records = l.bricks;
-    workspace_limits larger = limits;
-    status s = read_status(backend, {workspace.memory, workspace.bytes, limits, nullptr}, &larger);
-    if (need != nullptr && s.code == status_code::capacity_exceeded)
-        *need = {larger.tile_pairs, larger.tile_records, larger.fragment_records, larger.fragments};
+    return limits;
+}
+[[nodiscard]] inline distance_limits to_distance_limits(const workspace_limits& l) {
+    return {l.tile_pairs, l.tile_records, l.fragment_records, l.fragments};
+}
+// Waits. The status of a call in this memory, whose state comes first; *larger has what it needs (capacity_exceeded).
+[[nodiscard]] inline status read_search(cuda_backend& backend, void* memory, std::size_t bytes,
+                                        const workspace_limits& limits, workspace_limits* larger) {
+    status s = read_status(backend, {memory, bytes, limits, nullptr}, larger);
     if (!s.ok()) return s;
-    device::pipeline_state state{};
-    if (const status failed = device::read_start(workspace.memory, state, backend.stream); !failed.ok()) return failed;
+    pipeline_state state{};
+    if (const status failed = read_start(memory, state, backend.stream); !failed.ok()) return failed;
     s.distance.band_samples = state.kept;
+    return s;
+}
+
+} // namespace device
+
+// Waits for the stream and returns the status of the last call in this workspace, that of voxelize_distance. `need` may
+// be null. Where something did not fit (capacity_exceeded), *need receives larger limits; a call whose parts did not
+// fit has not counted all pairs and bricks, so that the same call may fail once more with these.
+[[nodiscard]] inline status read_distance_status(cuda_backend& backend, const distance_workspace_view& workspace,
+                                                 distance_limits* need = nullptr) {
+    const workspace_limits limits = device::to_workspace_limits(workspace.limits);
+    workspace_limits larger = limits;
+    const status s = device::read_search(backend, workspace.memory, workspace.bytes, limits, &larger);
+    if (need != nullptr && s.code == status_code::capacity_exceeded) *need = device::to_distance_limits(larger);
     return s;
 }
 

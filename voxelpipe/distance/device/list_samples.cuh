@@ -39,8 +39,8 @@ __global__ __launch_bounds__(threads_per_block) void list_samples_kernel(
     const __grid_constant__ found_samples found, const __grid_constant__ inside_rows inside,
     const __grid_constant__ sample_rows rows, const __grid_constant__ solid_list_arrays<Payload> to, bool count_voxels,
     pipeline_state* state, capacities limits) {
-    if (has_failed(*state, limits)) return;
     const bool is_counting = to.voxels == nullptr;
+    if (is_counting ? has_failed(*state, limits) : !to.hold(*state, limits)) return;
     const int lane = static_cast<int>(threadIdx.x % 32);
     const unsigned before = (1u << lane) - 1;
     const std::uint64_t warps = std::uint64_t{gridDim.x} * blockDim.x / 32;

@@ -69,10 +69,10 @@ public:
     [[nodiscard]] std::span<const emitted_draw> emitted() const { return emitted_; }
     [[nodiscard]] program_state* state() const { return state_; }
     [[nodiscard]] const program_room* rooms() const { return rooms_; }
-    void launch(const grid& g, std::size_t bytes_before_call, cudaStream_t stream) const {
+    // outside: where the triangles lie that are left out, position_outside or position_nowhere.
+    void launch(const glm::vec3& outside, std::size_t bytes_before_call, cudaStream_t stream) const {
         check(cudaMemsetAsync(state_, 0, sizeof(program_state), stream));
         run_pass(1, note_call{state_, bytes_before_call, core::counts_left_out<Amplify> ? 1u : 0u}, stream);
-        const glm::vec3 outside = core::position_outside(g);
         for (std::size_t d = 0; d < draws_.size(); ++d) draws_[d].launch(state_, rooms_ + d, outside, stream);
     }
 
@@ -91,6 +91,31 @@ private:
 // A size that is only planned has addresses that nobody reads: views without memory are invalid.
 [[nodiscard]] inline arena planning_arena() {
     return arena(reinterpret_cast<void*>(memory_resource::alignment)); // NOLINT(performance-no-int-to-ptr)
+}
+
+// Waits for the stream and reads what the programs of the last call in this memory have found. capacity_exceeded:
+// *need, if it is not null, has the room for triangles that they take, and the rest of the limits as they were.
+template <class Limits>
+[[nodiscard]] status read_programs(cuda_backend& backend, const void* memory, program_state& state,
+                                   const Limits& limits, Limits* need) {
+    if (const status s = read_start(memory, state, backend.stream); !s.ok()) return s;
+    const std::vector<std::uint64_t> counts(std::begin(state.counts), std::end(state.counts));
+    if (const status s = core::check_counts(counts, state.triangles); !s.ok()) return s;
+    if (state.stop == 0) return {};
+    status s = core::failure(status_code::capacity_exceeded, stage::vertex_shade);
+    s.counts.triangles_in = state.triangles;
+    if (need != nullptr) {
+        *need = limits;
+        need->triangles = std::max(need->triangles, state.largest);
+        need->lattice_points = std::max(need->lattice_points, state.largest_lattice.points);
+        need->lattice_triangles = std::max(need->lattice_triangles, state.largest_lattice.triangles);
+    }
+    return s;
+}
+// Triangles of a call behind programs that are none of those that they make: spare room, and what is left out.
+[[nodiscard]] inline std::uint64_t left_out_of(const program_state& state) {
+    const std::uint64_t counted = state.counts[core::index_of(core::program_count::left_out)];
+    return state.capacity - state.triangles + (state.has_left_out != 0 ? counted : 0);
 }
 } // namespace device
 
@@ -143,7 +168,7 @@ requires core::is_amplifier<Amplify>
                 }
                 device::arena memory(workspace.memory);
                 const programs_type programs(memory, draws, workspace.limits);
-                programs.launch(g, memory.used(), backend.stream);
+                programs.launch(core::position_outside(g), memory.used(), backend.stream);
                 const workspace_view behind{static_cast<std::byte*>(workspace.memory) + memory.used(),
                                             workspace.bytes - memory.used(), workspace.limits, &programs.state()->stop};
                 status s = voxelize_async<Known...>(backend, programs.emitted(), g, out, options, behind);
@@ -168,21 +193,8 @@ requires core::is_amplifier<Amplify>
 [[nodiscard]] inline status read_status(cuda_backend& backend, const program_workspace_view& workspace,
                                         program_limits* need = nullptr) {
     device::program_state state{};
-    if (const status s = device::read_start(workspace.memory, state, backend.stream); !s.ok()) return s;
-    const std::vector<std::uint64_t> counts(std::begin(state.counts), std::end(state.counts));
-    if (const status s = core::check_counts(counts, state.triangles); !s.ok()) return s;
-    if (state.stop != 0) {
-        status s = core::failure(status_code::capacity_exceeded, stage::vertex_shade);
-        s.counts.triangles_in = state.triangles;
-        if (need != nullptr) {
-            const auto larger = [](std::uint64_t a, std::uint64_t b) { return a > b ? a : b; };
-            *need = workspace.limits;
-            need->triangles = larger(need->triangles, state.largest);
-            need->lattice_points = larger(need->lattice_points, state.largest_lattice.points);
-            need->lattice_triangles = larger(need->lattice_triangles, state.largest_lattice.triangles);
-        }
+    if (const status s = device::read_programs(backend, workspace.memory, state, workspace.limits, need); !s.ok())
         return s;
-    }
     const workspace_view behind{static_cast<std::byte*>(workspace.memory) + state.bytes_before_call,
                                 workspace.bytes - state.bytes_before_call, workspace.limits};
     workspace_limits of_call;
@@ -192,9 +204,7 @@ requires core::is_amplifier<Amplify>
         static_cast<workspace_limits&>(*need) = of_call;
     }
     if (!s.ok()) return s;
-    const std::uint64_t left_out =
-        state.has_left_out != 0 ? state.counts[core::index_of(core::program_count::left_out)] : 0;
-    return core::without_left_out(s, state.capacity - state.triangles + left_out);
+    return core::without_left_out(s, device::left_out_of(state));
 }
 
 } // namespace voxelpipe

@@ -35,7 +35,7 @@ enum class grid_type : std::uint32_t {
     vec4f = 17,
     vec4d = 18,
 };
-enum class grid_class : std::uint32_t { unknown = 0, level_set = 1, topology = 6, voxel_volume = 7 };
+enum class grid_class : std::uint32_t { unknown = 0, level_set = 1, fog_volume = 2, topology = 6, voxel_volume = 7 };
 enum grid_flag : std::uint32_t {
     has_bounding_box = 1u << 1,
     has_extrema = 1u << 2,

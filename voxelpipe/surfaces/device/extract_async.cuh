@@ -116,11 +116,11 @@ public:
             run(num_words(), read_samples<view_type>{from_, options_.level, words_, &state_->counts.nan_samples},
                 stream);
         const std::uint64_t rows = cells.rows();
-        run(rows + 1, count_active_cells{cells, counts_}, stream);
+        device::count_active_cells(core::passes::count_active_cells{cells, counts_}, rows + 1, stream);
         sum(counts_, first_of_row_, rows + 1, stream);
         run(1, bound_cells{first_of_row_ + rows, room_.cells, state_}, stream);
-        run(rows, if_any<list_active_cells>{{cells, first_of_row_, first_of_word_, keys_, states_}, &state_->cells},
-            stream);
+        device::list_active_cells(core::passes::list_active_cells{cells, first_of_row_, first_of_word_, keys_, states_},
+                                  rows, &state_->cells, stream);
         run(room_.cells + 1,
             flip_bounded_cells{{cells.samples, table_, keys_, ~std::uint64_t{0}, states_, counts_, edges_},
                                &state_->cells},

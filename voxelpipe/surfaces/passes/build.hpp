@@ -5,6 +5,7 @@
 // From the bits of samples to a surface: cells, flips, vertices, quads, components, triangles. The same passes on every
 // backend.
 
+#include <voxelpipe/core/row_passes.hpp>
 #include <voxelpipe/surfaces/passes/embed.hpp>
 #include <voxelpipe/surfaces/passes/parts.hpp>
 #include <voxelpipe/surfaces/passes/vertices.hpp>
@@ -98,12 +99,13 @@ public:
         std::uint64_t count = 0;
         {
             buffer<std::uint32_t> counts(backend, rows + 1);
-            backend.for_each(rows + 1, passes::count_active_cells{grid_, counts.data()});
+            for_each_row(backend, rows + 1, passes::count_active_cells{grid_, counts.data()});
             count = backend.sum(counts, first_of_row);
         }
         if (!base::make_room(backend, count)) return;
-        backend.for_each(rows, passes::list_active_cells{grid_, first_of_row.data(), first_of_word_.data(),
-                                                         base::keys_.data(), base::states_.data()});
+        for_each_row(backend, rows,
+                     passes::list_active_cells{grid_, first_of_row.data(), first_of_word_.data(), base::keys_.data(),
+                                               base::states_.data()});
         base::number(backend, grid_.samples);
     }
 

@@ -59,7 +59,15 @@ struct count_members {
     const std::uint32_t* kept;
     std::uint64_t* sizes;
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        if (kept[i] != 0) add_shared(sizes[sets.root(static_cast<std::uint32_t>(i))], 1);
+        if (kept[i] == 0) return;
+        const std::uint32_t root = sets.root(static_cast<std::uint32_t>(i));
+#if defined(__CUDA_ARCH__)
+        // A warp's vertices are mostly of one component: one thread adds them all.
+        const unsigned same = __match_any_sync(__activemask(), root);
+        if ((same & ((1u << threadIdx.x % 32) - 1)) == 0) add_shared(sizes[root], static_cast<unsigned>(__popc(same)));
+#else
+        add_shared(sizes[root], 1);
+#endif
     }
 };
 
