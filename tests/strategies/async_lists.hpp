@@ -5,6 +5,7 @@
 // Asynchronous calls: captured ones, and those into fragment lists, in the caller's memory with a guard behind it,
 // against cpu_backend.
 
+#include "captured_graph.hpp"
 #include "device_test.hpp"
 
 #include <voxelpipe/device/abuffer_async.cuh>
@@ -50,32 +51,6 @@ struct guarded_memory {
         EXPECT_EQ(cudaStreamSynchronize(be.stream), cudaSuccess);
         for (std::size_t i = 0; i < guard; ++i) ASSERT_EQ(host[i], 0x5a) << i;
     }
-};
-
-// A captured call that can be launched again.
-class captured_graph {
-public:
-    captured_graph(cudaStream_t stream, const std::function<vp::status()>& call) {
-        EXPECT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
-        const vp::status s = call();
-        EXPECT_EQ(cudaStreamEndCapture(stream, &graph_), cudaSuccess);
-        EXPECT_TRUE(s.ok()) << s.message();
-        EXPECT_EQ(cudaGraphGetNodes(graph_, nullptr, &num_nodes_), cudaSuccess);
-        EXPECT_EQ(cudaGraphInstantiate(&instance_, graph_, 0), cudaSuccess);
-    }
-    captured_graph(const captured_graph&) = delete;
-    captured_graph& operator=(const captured_graph&) = delete;
-    ~captured_graph() {
-        cudaGraphExecDestroy(instance_);
-        cudaGraphDestroy(graph_);
-    }
-    [[nodiscard]] std::size_t num_nodes() const { return num_nodes_; }
-    void launch(cudaStream_t stream) const { ASSERT_EQ(cudaGraphLaunch(instance_, stream), cudaSuccess); }
-
-private:
-    cudaGraph_t graph_ = nullptr;
-    cudaGraphExec_t instance_ = nullptr;
-    std::size_t num_nodes_ = 0; // kernels and other nodes
 };
 
 // An asynchronous call of several draws on its own stream.

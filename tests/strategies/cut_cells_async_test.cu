@@ -3,6 +3,8 @@
 
 // voxelize_cells_async: the bytes and the status of voxelize_cells in the caller's memory, replayed by a graph; and
 // what it says of room that is too small and of bad input, which leave every target as it was.
+
+#include "captured_graph.hpp"
 #include "device_test.hpp"
 #include "solid_drawings.hpp"
 
@@ -120,44 +122,33 @@ namespace {
 // wait. Calls check(frame, status).
 template <class Check>
 void replay_frames(const mesh_data& m, const std::vector<std::vector<glm::vec3>>& frames, const Check& check) {
-    cudaStream_t stream = nullptr;
-    ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
-    {
-        vp::cuda_backend gpu{stream}; // frees its memory on the stream
-        const vp::grid g = device_test::box_grid(glm::ivec3(20));
-        std::vector<vp::mesh<vp::cuda_backend>> meshes;
-        meshes.emplace_back(gpu, m.positions, m.triangles);
-        const std::vector<async_draw> draws = draws_of(meshes);
-        async_target waited(gpu, g.extent), found(gpu, g.extent);
-        const cell_workspace room(gpu, draws, g, found, {}, 20000);
-        ASSERT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
-        cudaGraph_t graph = nullptr;
-        cudaGraphExec_t launchable = nullptr;
-        ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
-        const vp::status captured = run_async(gpu, draws, g, found, {}, room.view);
-        ASSERT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess); // a stream that captures cannot free
-        ASSERT_TRUE(captured.ok()) << captured.message();
-        ASSERT_EQ(cudaGraphInstantiate(&launchable, graph, 0), cudaSuccess);
-        for (std::size_t frame = 0; frame < frames.size(); ++frame) {
-            SCOPED_TRACE(frame);
-            const std::vector<glm::vec3>& moved = frames[frame];
-            ASSERT_EQ(moved.size(), m.positions.size());
-            ASSERT_EQ(cudaMemcpy(const_cast<glm::vec3*>(meshes[0].view().positions.data()), moved.data(),
-                                 moved.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice),
-                      cudaSuccess);
-            ASSERT_EQ(cudaGraphLaunch(launchable, stream), cudaSuccess);
-            const vp::status s = vp::read_cells_status(gpu, room.view);
-            ASSERT_TRUE(s.ok()) << s.message();
-            const vp::status expected = vp::voxelize_cells(gpu, draws, g, waited, {});
-            EXPECT_EQ(s.counts, expected.counts);
-            EXPECT_TRUE(s.cells == expected.cells);
-            check(frame, s);
-            expect_same_targets(gpu, waited, found);
-        }
-        EXPECT_EQ(cudaGraphExecDestroy(launchable), cudaSuccess);
-        EXPECT_EQ(cudaGraphDestroy(graph), cudaSuccess);
+    const device_test::owned_stream stream;
+    vp::cuda_backend gpu{stream.get()};
+    const vp::grid g = device_test::box_grid(glm::ivec3(20));
+    std::vector<vp::mesh<vp::cuda_backend>> meshes;
+    meshes.emplace_back(gpu, m.positions, m.triangles);
+    const std::vector<async_draw> draws = draws_of(meshes);
+    async_target waited(gpu, g.extent), found(gpu, g.extent);
+    const cell_workspace room(gpu, draws, g, found, {}, 20000);
+    ASSERT_EQ(cudaStreamSynchronize(stream.get()), cudaSuccess);
+    const device_test::captured_graph graph(stream.get(),
+                                            [&] { return run_async(gpu, draws, g, found, {}, room.view); });
+    for (std::size_t frame = 0; frame < frames.size(); ++frame) {
+        SCOPED_TRACE(frame);
+        const std::vector<glm::vec3>& moved = frames[frame];
+        ASSERT_EQ(moved.size(), m.positions.size());
+        ASSERT_EQ(cudaMemcpy(const_cast<glm::vec3*>(meshes[0].view().positions.data()), moved.data(),
+                             moved.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice),
+                  cudaSuccess);
+        graph.launch(stream.get());
+        const vp::status s = vp::read_cells_status(gpu, room.view);
+        ASSERT_TRUE(s.ok()) << s.message();
+        const vp::status expected = vp::voxelize_cells(gpu, draws, g, waited, {});
+        EXPECT_EQ(s.counts, expected.counts);
+        EXPECT_TRUE(s.cells == expected.cells);
+        check(frame, s);
+        expect_same_targets(gpu, waited, found);
     }
-    EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
 }
 
 } // namespace

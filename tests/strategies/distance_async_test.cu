@@ -3,6 +3,8 @@
 
 // voxelize_distance_async: the bytes and the status of voxelize_distance in the caller's memory, replayed by a graph;
 // and what it says of room that is too small and of bad input, which leave every target as it was.
+
+#include "captured_graph.hpp"
 #include "distance_drawings.hpp"
 
 #include "../programs/module_cases.hpp"
@@ -122,41 +124,31 @@ TEST(DeviceDistanceAsync, HaveTheBytesOfCallsThatWait) {
 
 // Captured once and replayed with vertices that move, to outside of the grid too.
 TEST(DeviceDistanceAsync, GraphsFollowTheVertices) {
-    cudaStream_t stream = nullptr;
-    ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
-    {
-        vp::cuda_backend gpu{stream}; // frees its memory on the stream
-        const vp::grid g = unit_grid(glm::ivec3(20));
-        const mesh_data m = device_test::ball({9, 10, 9}, 5.4f, 6);
-        std::vector<vp::mesh<vp::cuda_backend>> meshes;
-        meshes.emplace_back(gpu, m.positions, m.triangles);
-        const std::vector<async_draw> draws = async_draws(meshes);
-        async_target waited(gpu, g.extent), found(gpu, g.extent);
-        const distance_workspace room(gpu, draws, g, found, {}, {20000, 100, 100, 5000});
-        ASSERT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
-        cudaGraph_t graph = nullptr;
-        cudaGraphExec_t launchable = nullptr;
-        ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
-        ASSERT_TRUE(run_async(gpu, draws, g, found, {}, room.view).ok());
-        ASSERT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
-        ASSERT_EQ(cudaGraphInstantiate(&launchable, graph, 0), cudaSuccess);
-        for (int frame = 0; frame < 3; ++frame) {
-            std::vector<glm::vec3> moved = m.positions;
-            for (glm::vec3& p : moved) p += glm::vec3(frame == 1 ? 100.0f : 0.3f * static_cast<float>(frame));
-            ASSERT_EQ(cudaMemcpy(const_cast<glm::vec3*>(meshes[0].view().positions.data()), moved.data(),
-                                 moved.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice),
-                      cudaSuccess);
-            ASSERT_EQ(cudaGraphLaunch(launchable, stream), cudaSuccess);
-            const vp::status s = vp::read_distance_status(gpu, room.view);
-            ASSERT_TRUE(s.ok()) << s.message();
-            expect_same_status(vp::voxelize_distance(gpu, draws, g, waited, {}), s);
-            EXPECT_EQ(s.distance.band_samples == 0, frame == 1);
-            expect_same_targets(gpu, waited, found);
-        }
-        EXPECT_EQ(cudaGraphExecDestroy(launchable), cudaSuccess);
-        EXPECT_EQ(cudaGraphDestroy(graph), cudaSuccess);
+    const device_test::owned_stream stream;
+    vp::cuda_backend gpu{stream.get()};
+    const vp::grid g = unit_grid(glm::ivec3(20));
+    const mesh_data m = device_test::ball({9, 10, 9}, 5.4f, 6);
+    std::vector<vp::mesh<vp::cuda_backend>> meshes;
+    meshes.emplace_back(gpu, m.positions, m.triangles);
+    const std::vector<async_draw> draws = async_draws(meshes);
+    async_target waited(gpu, g.extent), found(gpu, g.extent);
+    const distance_workspace room(gpu, draws, g, found, {}, {20000, 100, 100, 5000});
+    ASSERT_EQ(cudaStreamSynchronize(stream.get()), cudaSuccess);
+    const device_test::captured_graph graph(stream.get(),
+                                            [&] { return run_async(gpu, draws, g, found, {}, room.view); });
+    for (int frame = 0; frame < 3; ++frame) {
+        std::vector<glm::vec3> moved = m.positions;
+        for (glm::vec3& p : moved) p += glm::vec3(frame == 1 ? 100.0f : 0.3f * static_cast<float>(frame));
+        ASSERT_EQ(cudaMemcpy(const_cast<glm::vec3*>(meshes[0].view().positions.data()), moved.data(),
+                             moved.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice),
+                  cudaSuccess);
+        graph.launch(stream.get());
+        const vp::status s = vp::read_distance_status(gpu, room.view);
+        ASSERT_TRUE(s.ok()) << s.message();
+        expect_same_status(vp::voxelize_distance(gpu, draws, g, waited, {}), s);
+        EXPECT_EQ(s.distance.band_samples == 0, frame == 1);
+        expect_same_targets(gpu, waited, found);
     }
-    EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
 }
 
 TEST(DeviceDistanceAsync, BadInputAndWhatItCannotDo) {

@@ -5,6 +5,7 @@
 // they say of room that is too small.
 
 #include "../surfaces/surface_support.hpp"
+#include "captured_graph.hpp"
 
 #include <voxelpipe/surfaces/device/remesh_async.cuh>
 #include <voxelpipe/voxelpipe.hpp>
@@ -185,39 +186,29 @@ TEST(DeviceSurfacesAsync, OfFieldsHaveTheBytesOfExtract) {
 }
 
 TEST(DeviceSurfacesAsync, GraphsFollowTheSamples) {
-    cudaStream_t stream = nullptr;
-    ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
-    {
-        vp::cuda_backend gpu{stream}; // frees its memory on the stream
-        const glm::ivec3 extent(20, 11, 9);
-        std::mt19937 random(3);
-        std::vector<float> values(20 * 11 * 9);
-        vp::cuda_backend::buffer<float> memory(gpu, values.size());
-        const vp::target_view<field> view{memory.data(), extent};
-        const workspace room(gpu, view, {}, {3000, 4000, 6000});
-        vp::surface_result out;
-        ASSERT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
-        cudaGraph_t graph = nullptr;
-        cudaGraphExec_t launchable = nullptr;
-        ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
-        ASSERT_TRUE(vp::extract_async(gpu, view, grid_of(extent), out, {}, room.view).ok());
-        ASSERT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
-        ASSERT_EQ(cudaGraphInstantiate(&launchable, graph, 0), cudaSuccess);
-        for (int frame = 0; frame < 3; ++frame) {
-            const double inside = frame == 1 ? 0.0 : 0.1 * frame + 0.3;
-            for (float& f : values) f = static_cast<double>(random() % 1000) < 1000 * inside ? -0.5f : 0.25f;
-            ASSERT_EQ(cudaMemcpy(memory.data(), values.data(), values.size() * sizeof(float), cudaMemcpyHostToDevice),
-                      cudaSuccess);
-            ASSERT_EQ(cudaGraphLaunch(launchable, stream), cudaSuccess);
-            const vp::status s = vp::read_surface_status(gpu, room.view);
-            ASSERT_TRUE(s.ok()) << s.message();
-            EXPECT_EQ(s.surface.vertices == 0, frame == 1);
-            EXPECT_TRUE(to_host(gpu, out, s).has_same_arrays(extract_field(gpu, values, grid_of(extent))));
-        }
-        EXPECT_EQ(cudaGraphExecDestroy(launchable), cudaSuccess);
-        EXPECT_EQ(cudaGraphDestroy(graph), cudaSuccess);
+    const device_test::owned_stream stream;
+    vp::cuda_backend gpu{stream.get()};
+    const glm::ivec3 extent(20, 11, 9);
+    std::mt19937 random(3);
+    std::vector<float> values(20 * 11 * 9);
+    vp::cuda_backend::buffer<float> memory(gpu, values.size());
+    const vp::target_view<field> view{memory.data(), extent};
+    const workspace room(gpu, view, {}, {3000, 4000, 6000});
+    vp::surface_result out;
+    ASSERT_EQ(cudaStreamSynchronize(stream.get()), cudaSuccess);
+    const device_test::captured_graph graph(
+        stream.get(), [&] { return vp::extract_async(gpu, view, grid_of(extent), out, {}, room.view); });
+    for (int frame = 0; frame < 3; ++frame) {
+        const double inside = frame == 1 ? 0.0 : 0.1 * frame + 0.3;
+        for (float& f : values) f = static_cast<double>(random() % 1000) < 1000 * inside ? -0.5f : 0.25f;
+        ASSERT_EQ(cudaMemcpy(memory.data(), values.data(), values.size() * sizeof(float), cudaMemcpyHostToDevice),
+                  cudaSuccess);
+        graph.launch(stream.get());
+        const vp::status s = vp::read_surface_status(gpu, room.view);
+        ASSERT_TRUE(s.ok()) << s.message();
+        EXPECT_EQ(s.surface.vertices == 0, frame == 1);
+        EXPECT_TRUE(to_host(gpu, out, s).has_same_arrays(extract_field(gpu, values, grid_of(extent))));
     }
-    EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
 }
 
 TEST(DeviceSurfacesAsync, RefusesWhatItCannotDo) {
@@ -254,41 +245,30 @@ TEST(DeviceRemeshAsync, HasTheBytesOfRemesh) {
 }
 
 TEST(DeviceRemeshAsync, GraphsFollowTheVertices) {
-    cudaStream_t stream = nullptr;
-    ASSERT_EQ(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), cudaSuccess);
-    {
-        vp::cuda_backend gpu{stream}; // frees its memory on the stream
-        const vp::grid g = grid_around_models(glm::ivec3(14, 13, 12));
-        const host_mesh m = ball(glm::vec3(0.5f), 0.35f, 1);
-        vp::cuda_backend::buffer<glm::vec3> positions(gpu, vp::array_view<const glm::vec3>(m.positions));
-        const vp::cuda_backend::buffer<glm::uvec3> triangles(gpu, vp::array_view<const glm::uvec3>(m.triangles));
-        const draw_type d{{positions.view(), triangles.view()}, {}, {}};
-        const std::span<const draw_type> draws(&d, 1);
-        const remesh_workspace room(gpu, draws, g, {}, {{2000, 2000, 3000}, 2000});
-        vp::surface_result out;
-        ASSERT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
-        cudaGraph_t graph = nullptr;
-        cudaGraphExec_t launchable = nullptr;
-        ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
-        ASSERT_TRUE(vp::remesh_async(gpu, draws, g, out, {}, room.view).ok());
-        ASSERT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
-        ASSERT_EQ(cudaGraphInstantiate(&launchable, graph, 0), cudaSuccess);
-        for (int frame = 0; frame < 3; ++frame) { // the second beside the grid
-            std::vector<glm::vec3> moved = m.positions;
-            for (glm::vec3& p : moved) p.x += frame == 1 ? 5.0f : 0.1f * static_cast<float>(frame);
-            ASSERT_EQ(
-                cudaMemcpy(positions.data(), moved.data(), moved.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice),
-                cudaSuccess);
-            ASSERT_EQ(cudaGraphLaunch(launchable, stream), cudaSuccess);
-            const vp::status s = vp::read_remesh_status(gpu, room.view);
-            ASSERT_TRUE(s.ok()) << s.message();
-            EXPECT_EQ(s.surface.vertices == 0, frame == 1);
-            EXPECT_TRUE(to_host(gpu, out, s).has_same_arrays(remesh_draws(gpu, draws, g, {})));
-        }
-        EXPECT_EQ(cudaGraphExecDestroy(launchable), cudaSuccess);
-        EXPECT_EQ(cudaGraphDestroy(graph), cudaSuccess);
+    const device_test::owned_stream stream;
+    vp::cuda_backend gpu{stream.get()};
+    const vp::grid g = grid_around_models(glm::ivec3(14, 13, 12));
+    const host_mesh m = ball(glm::vec3(0.5f), 0.35f, 1);
+    vp::cuda_backend::buffer<glm::vec3> positions(gpu, vp::array_view<const glm::vec3>(m.positions));
+    const vp::cuda_backend::buffer<glm::uvec3> triangles(gpu, vp::array_view<const glm::uvec3>(m.triangles));
+    const draw_type d{{positions.view(), triangles.view()}, {}, {}};
+    const std::span<const draw_type> draws(&d, 1);
+    const remesh_workspace room(gpu, draws, g, {}, {{2000, 2000, 3000}, 2000});
+    vp::surface_result out;
+    ASSERT_EQ(cudaStreamSynchronize(stream.get()), cudaSuccess);
+    const device_test::captured_graph graph(stream.get(),
+                                            [&] { return vp::remesh_async(gpu, draws, g, out, {}, room.view); });
+    for (int frame = 0; frame < 3; ++frame) { // the second beside the grid
+        std::vector<glm::vec3> moved = m.positions;
+        for (glm::vec3& p : moved) p.x += frame == 1 ? 5.0f : 0.1f * static_cast<float>(frame);
+        ASSERT_EQ(cudaMemcpy(positions.data(), moved.data(), moved.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice),
+                  cudaSuccess);
+        graph.launch(stream.get());
+        const vp::status s = vp::read_remesh_status(gpu, room.view);
+        ASSERT_TRUE(s.ok()) << s.message();
+        EXPECT_EQ(s.surface.vertices == 0, frame == 1);
+        EXPECT_TRUE(to_host(gpu, out, s).has_same_arrays(remesh_draws(gpu, draws, g, {})));
     }
-    EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
 }
 
 TEST(DeviceRemeshAsync, RefusesWhatItCannotDo) {
