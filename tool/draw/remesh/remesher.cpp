@@ -66,7 +66,7 @@ double surface_cells_of(const voxelize_request& request, double samples, double 
 }
 
 // As remesh_need, in slabs of that many layers, each by itself, while the arrays of the mesh are in files.
-double need_of_slabs(const scene& model, const voxelize_request& request, double crossings, int layers) {
+double need_of_remeshed_slabs(const scene& model, const voxelize_request& request, double crossings, int layers) {
     const glm::dvec3 n(request.grid.extent);
     const double drawn = std::min(n.z, layers + 2.0 * voxelpipe::surface_slab::beyond), samples = n.x * n.y * drawn;
     // Rows along z have the crossings of all layers below.
@@ -95,7 +95,7 @@ std::optional<int> layers_of_remesh(const scene& model, const voxelize_request& 
         return std::nullopt;
     }
     const double crossings = crossings_of(model, request.grid);
-    const auto need_of = [&](int layers) { return need_of_slabs(model, request, crossings, layers); };
+    const auto need_of = [&](int layers) { return need_of_remeshed_slabs(model, request, crossings, layers); };
     int layers = 1; // the need grows with them
     for (int more = extent.z - 1; more > 0; more /= 2)
         while (layers + more <= extent.z && need_of(layers + more) <= used * room) layers += more;
