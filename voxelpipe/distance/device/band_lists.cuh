@@ -142,9 +142,6 @@ __global__ __launch_bounds__(threads_per_block) void place_triangles(const __gri
             }
             in.frames[id] = f;
             in.triangles[id] = k;
-            if (in.balls != nullptr)
-                in.balls[id] =
-                    fits ? make_triangle_ball(k, in.units) : triangle_ball{0.0f, 0.0f, 0.0f, __builtin_inff()};
             if (m.counts != nullptr) {
                 const brick_box near = bricks_near(in, box);
                 const std::int64_t count = near.count();
@@ -166,7 +163,6 @@ __global__ __launch_bounds__(threads_per_block) void place_triangles(const __gri
             triangle_frame none{};
             none.is_wide = 2; // not drawn
             in.frames[id] = none;
-            if (in.balls != nullptr) in.balls[id] = triangle_ball::none();
         }
     }
     if (__syncthreads_or(static_cast<int>(bad)) != 0 && threadIdx.x == 0) atomicOr(&state->index_error, bad_index);

@@ -132,15 +132,9 @@ __global__ __launch_bounds__(threads_per_block,
         octant_search search(in, memory[warp], first_of_octant(in.first_sample(own.brick), own.octant));
         // The rounds of 32 that are the warp's own.
         const std::uint32_t first = own.begin + (is_long ? 32 * warp : 0), step = is_long ? threads_per_block : 32;
-        // The triangle whose ball ends nearest bounds what others need a look at their frames.
         near_triangle nearest = near_triangle::none();
         for (std::uint32_t i = first + lane; i < own.end; i += step)
-            nearest.take({search.look_at_ball(m.listed[i]).high, m.listed[i]});
-        nearest = nearest.of_warp();
-        if (nearest.primitive != no_primitive) nearest.distance = search.look(nearest.primitive).high;
-        for (std::uint32_t i = first + lane; i < own.end; i += step)
-            if (const std::uint32_t t = m.listed[i]; search.may_be_within(t, nearest.distance))
-                nearest.take({search.look(t).high, t});
+            nearest.take({search.look(m.listed[i]).high, m.listed[i]});
         __syncwarp();
         nearest = nearest.of_warp();
         if (is_long) {

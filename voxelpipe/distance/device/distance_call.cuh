@@ -55,7 +55,6 @@ struct distance_call<draw<Mesh, VertexShader, Shader>> {
         memory m{state, draws_type(a, draws), make_distance_input(samples, options), {}, {}, {}, {}};
         m.in.num_counted = num_primitives;
         m.in.frames = a.take<triangle_frame>(num_primitives);
-        m.in.balls = a.take<triangle_ball>(num_primitives);
         m.in.triangles = a.take<kept_triangle>(num_primitives);
         const std::uint32_t bricks = m.in.num_bricks();
         std::uint64_t places = bricks;

@@ -31,16 +31,6 @@ struct alignas(16) kept_triangle {
 };
 static_assert(sizeof(kept_triangle) == 48);
 
-// A ball that holds a triangle, for a first look at it: 16 bytes, where a frame has 96 that lie anywhere in memory.
-struct alignas(16) triangle_ball {
-    float x, y, z; // units from the first voxel
-    float radius;  // rounded up, with what the centre and a point nearby are off by; infinity: no bound
-
-    // False for a triangle that is not drawn.
-    [[nodiscard]] VOXELPIPE_HD bool is_drawn() const { return radius >= 0.0f; }
-    [[nodiscard]] VOXELPIPE_HD static triangle_ball none() { return {0.0f, 0.0f, 0.0f, -1.0f}; }
-};
-
 struct distance_input {
     geometry geo;
     core::distance_scale scale; // world units
@@ -54,7 +44,6 @@ struct distance_input {
     float brick_radius, octant_radius; // of the balls that hold the samples of a brick and of its eighth
     kept_triangle* triangles;          // by primitive
     triangle_frame* frames;            // by primitive
-    triangle_ball* balls;              // by primitive; null where nobody looks at them
     std::uint32_t num_counted;         // triangles of the draws; those behind them close holes
 
     [[nodiscard]] VOXELPIPE_HD std::uint32_t num_bricks() const {
@@ -98,30 +87,6 @@ struct distance_input {
 [[nodiscard]] __device__ __noinline__ inline double find_square(const distance_input& in, std::uint32_t primitive,
                                                                 const core::snapped_position& p, bool is_sample) {
     return core::find_distance(see_exactly(in, primitive, p, is_sample), in.scale).square;
-}
-
-// Its radius holds for points whose coordinates are rounded products of an integer and units.unit: these are off by 3 r
-// of each coordinate (r = 2^-24), the centre by 1 r, the difference of both and its length by 3 r of it; 16 r of the
-// centre's coordinates, of the radius and, of whoever compares, of the distance are more.
-[[nodiscard]] __device__ inline triangle_ball make_triangle_ball(const kept_triangle& t, const frame_scale& units) {
-    double low[3], high[3], square = 0.0, sum = 0.0;
-    for (int k = 0; k < 3; ++k) {
-        const std::int32_t a = t.vertex[0][k], b = t.vertex[1][k], c = t.vertex[2][k];
-        low[k] = static_cast<double>(core::min3(a, b, c)) * units.exact[k];
-        high[k] = static_cast<double>(core::max3(a, b, c)) * units.exact[k];
-    }
-    for (int n = 0; n < 3; ++n) {
-        double of_vertex = 0.0;
-        for (int k = 0; k < 3; ++k) {
-            const double d = static_cast<double>(t.vertex[n][k]) * units.exact[k] - 0.5 * (low[k] + high[k]);
-            of_vertex += d * d;
-        }
-        square = of_vertex > square ? of_vertex : square;
-    }
-    for (int k = 0; k < 3; ++k) sum += low[k] + high[k] < 0.0 ? -0.5 * (low[k] + high[k]) : 0.5 * (low[k] + high[k]);
-    return {static_cast<float>(0.5 * (low[0] + high[0])), static_cast<float>(0.5 * (low[1] + high[1])),
-            static_cast<float>(0.5 * (low[2] + high[2])),
-            static_cast<float>(exact::sqrt(square) * (1.0 + 0x1p-20) + 0x1p-20 * sum)};
 }
 
 // Fills all but the geometry and the arrays.

@@ -3,13 +3,12 @@
 #pragma once
 
 // The nearest triangles of the 4^3 samples of an octant of a brick, two a lane of a warp. Triangles come 32 at a time.
-// First each lane bounds the distance of its triangle from the octant's centre, by its ball and, where that does not
-// do, by its frame: the nearest one is the reference, and its distances from the octant's corner samples are bounds. A
-// triangle can only be the nearest of a sample if some corner is no farther above a plane below which the triangle lies
-// than it is from the reference: the height above a plane minus a distance from a triangle is concave, so it is least
-// at a corner. Triangles that can are measured in float from all samples, and (sample, triangle) is queued where the
-// distance may be the least so far. Of those that may still be the least when the queue is full, and at the end, the
-// formula decides: a minimum, so no order shows.
+// First each lane bounds the distance of its triangle from the octant's centre: the nearest one is the reference, and
+// its distances from the octant's corner samples are bounds. A triangle can only be the nearest of a sample if some
+// corner is no farther above a plane below which the triangle lies than it is from the reference: the height above a
+// plane minus a distance from a triangle is concave, so it is least at a corner. Triangles that can are measured in
+// float from all samples, and (sample, triangle) is queued where the distance may be the least so far. Of those that
+// may still be the least when the queue is full, and at the end, the formula decides: a minimum, so no order shows.
 
 #include <voxelpipe/core/bits.hpp>
 #include <voxelpipe/device/base/warp.cuh>
@@ -84,25 +83,6 @@ struct octant_search {
         __syncwarp();
     }
 
-    // Bounds of the distance of the lane's triangle from the octant's centre, by its ball.
-    struct ball_look {
-        float low, high;
-    };
-    [[nodiscard]] __device__ VOXELPIPE_INLINE ball_look look_at_ball(std::uint32_t primitive) const {
-        const triangle_ball b = in.balls[primitive];
-        const float c[3] = {static_cast<float>(centre[0]) * in.units.unit[0],
-                            static_cast<float>(centre[1]) * in.units.unit[1],
-                            static_cast<float>(centre[2]) * in.units.unit[2]};
-        const float x = c[0] - b.x, y = c[1] - b.y, z = c[2] - b.z;
-        const float distance = sqrtf(x * x + y * y + z * z);
-        // The centre may lie far from a small ball at the origin.
-        const float slack = 0x1p-20f * (distance + magnitude(c[0]) + magnitude(c[1]) + magnitude(c[2]));
-        return {distance - slack - b.radius, distance + slack + b.radius};
-    }
-    // True if the lane's triangle may lie within a distance of the centre.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE bool may_be_within(std::uint32_t primitive, float distance) const {
-        return !(look_at_ball(primitive).low > distance);
-    }
     // The lane's triangle.
     [[nodiscard]] __device__ octant_look look(std::uint32_t primitive) const {
         const triangle_frame& f = in.frames[primitive];
@@ -161,7 +141,6 @@ struct octant_search {
     }
     // Measures the lanes' triangles from all samples. All lanes call it.
     __device__ void visit(bool has_one, std::uint32_t primitive) {
-        has_one = has_one && may_be_within(primitive, limit + in.octant_radius);
         octant_look own{infinity, infinity, 0.0f, 0.0f, {0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
         if (has_one) own = look(primitive);
         const float own_slack = slack_of(own.error);

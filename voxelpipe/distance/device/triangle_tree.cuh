@@ -305,10 +305,8 @@ __global__ __launch_bounds__(threads_per_block, 2) void search_tree(const __grid
         const auto look_at = [&](std::uint32_t run) {
             const std::uint64_t i = std::uint64_t{run} * 32 + lane;
             near_triangle own = near_triangle::none();
-            if (i < t.num_primitives)
-                if (const std::uint32_t id = t.order[i];
-                    in.balls[id].is_drawn() && search.may_be_within(id, nearest.distance))
-                    own = {search.look(id).high, id};
+            if (i < t.num_primitives && in.frames[t.order[i]].is_wide != 2)
+                own = {search.look(t.order[i]).high, t.order[i]};
             nearest.take(own.of_warp());
         };
         visit_one_run(t, p, look_at);
@@ -321,7 +319,7 @@ __global__ __launch_bounds__(threads_per_block, 2) void search_tree(const __grid
             [&](std::uint32_t run) {
                 const std::uint64_t i = std::uint64_t{run} * 32 + lane;
                 const std::uint32_t id = i < t.num_primitives ? t.order[i] : 0;
-                search.visit(i < t.num_primitives && in.balls[id].is_drawn(), id);
+                search.visit(i < t.num_primitives && in.frames[id].is_wide != 2, id);
             });
         search.decide();
         to.write(search, brick);
