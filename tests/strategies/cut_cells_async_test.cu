@@ -137,8 +137,8 @@ void replay_frames(const mesh_data& m, const std::vector<std::vector<glm::vec3>>
         SCOPED_TRACE(frame);
         const std::vector<glm::vec3>& moved = frames[frame];
         ASSERT_EQ(moved.size(), m.positions.size());
-        ASSERT_EQ(cudaMemcpy(const_cast<glm::vec3*>(meshes[0].view().positions.data()), moved.data(),
-                             moved.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice),
+        ASSERT_EQ(cudaMemcpyAsync(const_cast<glm::vec3*>(meshes[0].view().positions.data()), moved.data(),
+                                  moved.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice, stream.get()),
                   cudaSuccess);
         graph.launch(stream.get());
         const vp::status s = vp::read_cells_status(gpu, room.view);

@@ -139,8 +139,8 @@ TEST(DeviceDistanceAsync, GraphsFollowTheVertices) {
     for (int frame = 0; frame < 3; ++frame) {
         std::vector<glm::vec3> moved = m.positions;
         for (glm::vec3& p : moved) p += glm::vec3(frame == 1 ? 100.0f : 0.3f * static_cast<float>(frame));
-        ASSERT_EQ(cudaMemcpy(const_cast<glm::vec3*>(meshes[0].view().positions.data()), moved.data(),
-                             moved.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice),
+        ASSERT_EQ(cudaMemcpyAsync(const_cast<glm::vec3*>(meshes[0].view().positions.data()), moved.data(),
+                                  moved.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice, stream.get()),
                   cudaSuccess);
         graph.launch(stream.get());
         const vp::status s = vp::read_distance_status(gpu, room.view);

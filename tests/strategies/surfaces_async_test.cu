@@ -201,7 +201,8 @@ TEST(DeviceSurfacesAsync, GraphsFollowTheSamples) {
     for (int frame = 0; frame < 3; ++frame) {
         const double inside = frame == 1 ? 0.0 : 0.1 * frame + 0.3;
         for (float& f : values) f = static_cast<double>(random() % 1000) < 1000 * inside ? -0.5f : 0.25f;
-        ASSERT_EQ(cudaMemcpy(memory.data(), values.data(), values.size() * sizeof(float), cudaMemcpyHostToDevice),
+        ASSERT_EQ(cudaMemcpyAsync(memory.data(), values.data(), values.size() * sizeof(float), cudaMemcpyHostToDevice,
+                                  stream.get()),
                   cudaSuccess);
         graph.launch(stream.get());
         const vp::status s = vp::read_surface_status(gpu, room.view);
@@ -261,7 +262,8 @@ TEST(DeviceRemeshAsync, GraphsFollowTheVertices) {
     for (int frame = 0; frame < 3; ++frame) { // the second beside the grid
         std::vector<glm::vec3> moved = m.positions;
         for (glm::vec3& p : moved) p.x += frame == 1 ? 5.0f : 0.1f * static_cast<float>(frame);
-        ASSERT_EQ(cudaMemcpy(positions.data(), moved.data(), moved.size() * sizeof(glm::vec3), cudaMemcpyHostToDevice),
+        ASSERT_EQ(cudaMemcpyAsync(positions.data(), moved.data(), moved.size() * sizeof(glm::vec3),
+                                  cudaMemcpyHostToDevice, stream.get()),
                   cudaSuccess);
         graph.launch(stream.get());
         const vp::status s = vp::read_remesh_status(gpu, room.view);
