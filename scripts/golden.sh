@@ -119,6 +119,11 @@ tool_cases() {
     printf 'file.vtu.threshold model.glb out.vtu -r 28 -t fraction --threshold 0.5\n'
     printf 'file.ply.points model.glb out.ply -r 40 --points\n'
     for format in glb obj ply stl 3mf; do printf 'file.%s.merge model.glb out.%s -r 40 --merge\n' "$format" "$format"; done
+    for format in glb obj ply stl 3mf npz; do
+        printf 'file.%s.remesh model.glb out.%s -r 28 --remesh\n' "$format" "$format"
+    done
+    printf 'remesh.tool.quads open.stl out.ply -r 32 --remesh --close-holes --quads --place mean\n'
+    printf 'remesh.tool.level model.glb out.npz -r 28 --remesh --iso 0.3 --padding 2 --place corner\n'
     # Without an angle, so that the picture takes no sine, which differs between machines.
     printf 'file.png model.glb out.png -r 24 --image-size 96x72 --azimuth 0 --elevation 0 --fov 0\n'
     for target in occupancy count color color-max color-replace color-outer normal material triangle depth; do

@@ -23,7 +23,7 @@
 #include <voxelpipe/device/backend.cuh>
 #include <voxelpipe/distance/device/distance.cuh>
 #include <voxelpipe/label/device/label.cuh>
-#include <voxelpipe/surfaces/device/surfaces.cuh>
+#include <voxelpipe/surfaces/device/sparse_surfaces.cuh>
 
 #include <cuda_runtime.h>
 
