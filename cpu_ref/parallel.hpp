@@ -78,7 +78,9 @@ public:
             if (merges && remembered.empty()) remembered.resize(num_remembered);
             part.clear();
             std::uint64_t added = 0;
-            const auto add = [&, &items = part, &places = remembered](const Item& item) {
+            std::vector<Item>& items = part; // lambdas capture no structured bindings
+            std::vector<std::uint32_t>& places = remembered;
+            const auto add = [&](const Item& item) {
                 ++added;
                 if constexpr (merges) {
                     std::uint32_t& at = places[item.key * 0x9e3779b97f4a7c15u >> (64 - log2_remembered)];
