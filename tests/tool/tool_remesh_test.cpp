@@ -396,7 +396,7 @@ TEST(Remeshing, LargeGridsTakeMemoryByTheSurface) {
     EXPECT_EQ(2, json::parse(result.out)["remesh"]["components"]);
     EXPECT_TRUE(read_surface_ply(folder / "o.ply").is_closed());
     const outcome refused = run(folder, {folder / "m.obj", "--remesh", "-r", "3000", "--max-memory", "300", "--iso",
-                                         "0.2", "-o", folder / "o.ply"});
+                                         "0.2", "--embedded", "-o", folder / "o.ply"});
     EXPECT_NE(0, refused.code);
     EXPECT_NE(std::string::npos, refused.err.find("MiB are needed")) << refused.err;
 }
