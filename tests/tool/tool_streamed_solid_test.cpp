@@ -233,11 +233,11 @@ TEST(StreamedDistances, AreThoseOfTheModelThatIsHeld) {
         .expect_equal(60, {});
     write_ball(folder / "m.ply", 16);
     // The model leaves the grid: slabs without triangles, and rows that only triangles beside the grid cross.
-    for (const char* const repair : {"--close-holes", "--winding"})
-        two_ways{folder,
-                 folder / "m.ply",
-                 {"--voxel-size", "0.02", "--origin", "0.3,0.1,-0.4", "--extent", "30,50,70", "--distance", repair}}
-            .expect_equal(75, {});
+    two_ways{
+        folder,
+        folder / "m.ply",
+        {"--voxel-size", "0.02", "--origin", "0.3,0.1,-0.4", "--extent", "30,50,70", "--distance", "--close-holes"}}
+        .expect_equal(75, {});
     const two_ways open{folder, folder / "m.ply", {"-r", "40", "--distance", "--solid", "positive"}};
     open.expect_equal(60, {});
     EXPECT_NE(std::string::npos, open.draw_streamed(60).err.find("the sign of --distance: the model is not closed"));
@@ -254,8 +254,11 @@ TEST(StreamedDistances, WholeFieldsInMemoryAndWhatNeedsTheModel) {
     ASSERT_EQ(0, free.code) << free.err;
     EXPECT_NE(std::string::npos, tight.err.find(" triangles do not fit")) << tight.err;
     EXPECT_TRUE(read_file(folder / "tight.nvdb") == read_file(folder / "free.nvdb"));
-    for (const std::vector<std::string>& more :
-         {std::vector<std::string>{"--band", "whole"}, {"--corners"}, {"--vote"}, {"--solid", "exterior"}}) {
+    for (const std::vector<std::string>& more : {std::vector<std::string>{"--band", "whole"},
+                                                 {"--corners"},
+                                                 {"--vote"},
+                                                 {"--winding"},
+                                                 {"--solid", "exterior"}}) {
         std::vector<std::string> all = more;
         all.insert(all.end(), {"--max-memory", "44"});
         const outcome refused = values.draw("no.npz", all);

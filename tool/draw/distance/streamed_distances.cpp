@@ -185,7 +185,8 @@ volume whole_field(Distances& distances, const voxelize_request& request) {
 
 bool streams_distances(const voxelize_request& request) {
     const distance_request& distance = *request.distance;
-    const bool sees_all = distance.is_signed && (distance.sign.rule == solid_rule::exterior || distance.sign.vote);
+    const bool sees_all = distance.is_signed && (distance.sign.rule == solid_rule::exterior || distance.sign.vote ||
+                                                 distance.sign.winding); // of all triangles, not of a slab's
     return !distance.is_whole && !distance.at_corners && !sees_all && request.backend != backend_choice::cuda;
 }
 
