@@ -74,7 +74,7 @@ struct backend_calls {
 };
 
 [[nodiscard]] backend_calls cpu_calls(unsigned threads);
-// Of the first device that CUDA shows. Throws a failure where there is none. Defined where CUDA is compiled.
+// Makes the calls of the first CUDA device. Throws a failure where there is none. Only a build with CUDA defines it.
 [[nodiscard]] backend_calls cuda_calls(unsigned threads);
 [[nodiscard]] std::unique_ptr<const surface_calls> cuda_surfaces(unsigned threads);
 [[nodiscard]] std::unique_ptr<const solid_calls> cuda_solids();
