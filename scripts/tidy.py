@@ -6,8 +6,8 @@
 clang's static analyzer takes three quarters of the time. Without --deep it leaves a function after 40,000 steps instead of
 225,000, which halves that.
 
-Most of a run goes into the headers that sources share: all sources with the same flags are checked as one file, their
-texts one behind the other, so that checks that look at a main file see each of them. Where two sources have the same name
+Most of a run goes into the headers that sources share: all samples, or all sources of the tool, that have the same flags are
+checked as one file, their texts one behind the other, so that checks that look at a main file see each of them. Where two sources have the same name
 for two things, each stands in a namespace; where that does not compile either, the sources are halved. A file that does
 not come out clean is checked again, each source apart, and that counts: the messages then name the source and its line.
 """
@@ -22,12 +22,20 @@ import sys
 
 
 def flags_of(entry):
-    """The compiler and its flags: no launcher, no files, no optimisation."""
+    """The compiler and its flags: no launcher, no files, no optimisation, no precompiled header, which is of one level of
+    optimisation."""
     given = iter(entry.get("arguments") or shlex.split(entry["command"]))
     kept = []
     for argument in given:
         if argument in ("-o", "-c", "-MF", "-MT"):
             next(given)
+        elif argument == "-Xclang":
+            word = next(given)
+            if word.startswith("-include"):
+                next(given)  # -Xclang
+                next(given)  # the file
+            else:
+                kept += [argument, word]
         elif argument != "-MD" and not re.fullmatch(r"-O.?|.*/ccache|ccache", argument):
             kept.append(argument)
     return tuple(kept)
@@ -74,7 +82,8 @@ def main():
     groups = {}
     for entry in json.loads((build / "compile_commands.json").read_text(encoding="utf-8")):
         if wanted.search(entry["file"]):
-            groups.setdefault(flags_of(entry), []).append(entry["file"])
+            folder = "samples" if "/samples/" in entry["file"] else ""
+            groups.setdefault((folder, flags_of(entry)), []).append(entry["file"])
     if not groups:
         sys.exit("no source matches")
 
@@ -100,7 +109,7 @@ def main():
         join(flags, sources[:middle])
         join(flags, sources[middle:])
 
-    for flags, sources in groups.items():
+    for (_, flags), sources in groups.items():
         join(flags, sources)
     (joined / "compile_commands.json").write_text(json.dumps([entry for entry, _ in database], indent=1))
 

@@ -98,7 +98,7 @@ public:
     }
 
     [[nodiscard]] std::uint64_t expected_vertices() const override {
-        const std::size_t least = file_.is_text() ? 6 : elements_[vertex_].bytes();
+        const std::size_t least = file_.is_text() ? 6 : std::max<std::size_t>(elements_[vertex_].bytes(), 1);
         return std::min(elements_[vertex_].count, file_.file_bytes() / least);
     }
     [[nodiscard]] std::optional<layouts> vertices_in_place() const override { return layouts_; }
