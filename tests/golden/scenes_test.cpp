@@ -5,6 +5,7 @@
 // oracle. Two programs contain this file. The one with all_scenes.cpp has large grids and those benchmark scenes that
 // are present, the one with small_scenes.cpp has small grids of generated meshes.
 
+#include "../test_scale.hpp"
 #include "all_scenes.hpp"
 #include "bit_digest.hpp"
 #include "generated_meshes.hpp"
@@ -85,11 +86,6 @@ std::vector<scene_case> make_cases() {
     return cases;
 }
 
-double test_scale() {
-    const char* const text = std::getenv("VOXELPIPE_TEST_SCALE");
-    return text == nullptr ? 1.0 : std::strtod(text, nullptr);
-}
-
 struct outcome {
     std::uint64_t voxels, fragments;
     std::vector<std::uint32_t> words;
@@ -145,7 +141,7 @@ TEST_P(Scenes, HaveTheRecordedVoxelsAndTheOracleAgrees) {
             EXPECT_TRUE(voxelize(mesh, GetParam(), threads).words == r.words) << threads << " threads";
     }
 
-    const int count = std::max(50, static_cast<int>(1000 * test_scale()));
+    const int count = std::max(50, static_cast<int>(1000 * tests::test_scale()));
     const unsigned seed = std::random_device{}(); // other voxels in every run
     SCOPED_TRACE("seed of the picks: " + std::to_string(seed));
     const sample_result samples = check_with_oracle(mesh, r.grid, GetParam().rule, r.words, count, seed);

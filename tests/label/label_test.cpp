@@ -3,6 +3,7 @@
 
 // label on cpu_backend: the components of a flood, by labels of both types, for any threads; neighbourhoods one by one;
 // bad input.
+#include "../test_scale.hpp"
 #include "label_support.hpp"
 
 #include <cpu_ref/backend.hpp>
@@ -12,7 +13,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstdlib>
 #include <random>
 #include <thread>
 #include <vector>
@@ -25,9 +25,7 @@ using labels_view = vp::target_view<vp::target<std::int32_t, vp::blend::replace>
 
 // Builds with sanitizers set it below 1.
 std::uint32_t scaled(std::uint32_t count) {
-    const char* const text = std::getenv("VOXELPIPE_TEST_SCALE");
-    const double scale = text != nullptr ? std::atof(text) : 1.0;
-    return scale < 1.0 ? static_cast<std::uint32_t>(static_cast<double>(count) * scale) + 100 : count;
+    return tests::is_slow_build() ? static_cast<std::uint32_t>(count * tests::test_scale()) + 100 : count;
 }
 
 TEST(Label, RandomGridsAreTheFloods) {
@@ -166,7 +164,7 @@ TEST(Label, IsCalledWithTargetsOfFramebuffers) {
 // Threads that make roots the parents of all numbers leave nothing else, though others follow the same paths meanwhile.
 TEST(Label, ThreadsFlattenSets) {
     constexpr std::uint32_t numbers = 3000;
-    for (int run = 0; run < 200; ++run) {
+    for (int run = 0; run < (tests::is_slow_build() ? 20 : 200); ++run) {
         std::vector<std::uint32_t> parents(numbers);
         for (std::uint32_t i = 0; i < numbers; ++i) parents[i] = i == 0 ? 0 : i - 1;
         const vp::core::disjoint_sets<std::uint32_t> sets{parents.data()};

@@ -80,7 +80,7 @@ TEST(SurfaceSlabs, OfRemeshesAreTheWhole) {
           vp::remesh_options{.level = 0.05},
           vp::remesh_options{.sample = vp::sample::corner, .repair = vp::repair::close_holes, .level = -0.03}}) {
         const int layers = around.extent.z + (o.sample == vp::sample::corner ? 1 : 0);
-        for (int k = 0; k < 3; ++k) {
+        for (int k = 0; k < (tests::is_slow_build() ? 1 : 3); ++k) {
             const host_mesh m = bad_model(seed++);
             expect_the_remesh(m, around, {1, 3, 1, 9, layers - 14}, o, value_shader{k == 1 ? 1u : ~0u});
             expect_the_remesh(m, around, {layers}, o);

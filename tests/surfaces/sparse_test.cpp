@@ -57,7 +57,7 @@ TEST(SparseSurfaces, OfTilesAreTheDenseOnes) {
     models.push_back(box(at(3, 8, 16), at(35, 40, 48)));
     models.back().add(box(at(35, 40, 48), at(51, 56, 64))); // two that share a corner
     std::uint64_t tiles = 0;
-    for (std::size_t i = 0; i < models.size(); ++i) {
+    for (std::size_t i = 0; i < models.size(); i += tests::is_slow_build() ? 3 : 1) {
         const both_surfaces s = extract_solid(backend, models[i], g, {.embedded = i == 5});
         EXPECT_TRUE(s.are_the_same()) << i;
         EXPECT_TRUE(s.sparse.is_closed_manifold()) << i;
@@ -110,7 +110,7 @@ TEST(SparseSurfaces, RefuseWhatHasNoMeaning) {
 
 TEST(SparseSurfaces, OfBadModelsAreTheDenseOnes) {
     vp::cpu_backend backend{2};
-    for (std::uint32_t seed = 0; seed < 8; ++seed) {
+    for (std::uint32_t seed = 0; seed < (tests::is_slow_build() ? 1u : 8u); ++seed) {
         const host_mesh m = bad_model(seed);
         const vp::grid g = grid_around_models(glm::ivec3(18, 21, 19));
         for (const vp::remesh_options& o :
@@ -138,7 +138,8 @@ TEST(SparseSurfaces, OfLevelsAreTheDenseOnes) {
     const vp::grid g = grid_of(glm::ivec3(56));
     host_mesh m = ball(glm::vec3(28), 26.5f, 3);
     m.add(box(glm::vec3(-9, 20, 20), glm::vec3(12, 36, 36)));
-    for (const double level : {-9.0, -0.25, 1.5, 6.0}) {
+    for (const double level : {-9.0, 1.5, -0.25, 6.0}) {
+        if (tests::is_slow_build() && level == 1.5) break;
         const host_surface sparse = remesh_sparse(backend, m, g, {.level = level}),
                            dense = remesh(backend, m, g, {.level = level});
         EXPECT_TRUE(sparse.has_same_arrays(dense)) << level;

@@ -4,6 +4,7 @@
 
 // Volumes and meshes for the tests of surfaces, on any backend.
 
+#include "../test_scale.hpp"
 #include "mesh_judge.hpp"
 
 #include <voxelpipe/surfaces/extract.hpp>

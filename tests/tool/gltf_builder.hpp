@@ -3,7 +3,7 @@
 #pragma once
 // Small glTF files for tests: JSON that a test fills in as it likes, and one buffer that grows by what it appends.
 
-#include "slow_build.hpp"
+#include "../test_scale.hpp"
 
 #include <glm/glm.hpp>
 #include <nlohmann/json.hpp>
@@ -22,7 +22,7 @@
 namespace gltf_test {
 
 using nlohmann::json;
-using tool_test::is_slow_build;
+using tests::is_slow_build;
 
 // Every one, but in a slow build one in `step`.
 template <class T>

@@ -4,7 +4,7 @@
 // what is wrong with a file is told by its line.
 #include "obj_files.hpp"
 
-#include "slow_build.hpp"
+#include "../test_scale.hpp"
 
 #include <cmath>
 #include <cstdio>

@@ -3,7 +3,7 @@
 // Meshes of voxels are closed manifolds, whatever the voxels: judged by edges and cycles of faces, which say nothing of
 // how the mesh was made.
 
-#include "../slow_build.hpp"
+#include "../../test_scale.hpp"
 #include "test_volumes.hpp"
 #include "write/formats/formats.hpp"
 #include "write/formats/voxel_mesh.hpp"
@@ -181,7 +181,7 @@ TEST_F(MeshManifold, EverySetOfTwelveVoxels) {
 }
 
 TEST_F(MeshManifold, RandomVoxelsDenseSparseAndInSlabs) {
-    const bool slow = tool_test::is_slow_build();
+    const bool slow = tests::is_slow_build();
     for (unsigned seed = 0; seed < (slow ? 20U : 200U); ++seed)
         expect_manifold(random_volume({4, 4, 4}, 0.3 + 0.002 * seed, seed), "4^3, seed " + std::to_string(seed));
     for (const double density : {0.02, 0.3, 0.5, 0.7, 0.98})

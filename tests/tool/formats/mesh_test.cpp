@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "../slow_build.hpp"
+#include "../../test_scale.hpp"
 #include "test_volumes.hpp"
 #include "write/formats/formats.hpp"
 #include "write/formats/stl.hpp"
@@ -134,7 +134,7 @@ TEST_F(Mesh, CornersAreSharedByEqualColours) {
 }
 
 TEST_F(Mesh, ThreadsChangeNothing) {
-    const volume v = tool_test::is_slow_build() ? make_colored({70, 11, 9}, 3) : make_colored({70, 41, 37}, 3);
+    const volume v = tests::is_slow_build() ? make_colored({70, 11, 9}, 3) : make_colored({70, 41, 37}, 3);
     for (const bool merge : {false, true}) {
         const auto one = voxel_faces(voxel_shape(v, 1), merge, 1, {});
         EXPECT_TRUE(one == voxel_faces(voxel_shape(v, 1), merge, 5, {}));

@@ -3,7 +3,7 @@
 
 #include "write/preview_scene.hpp"
 
-#include "../slow_build.hpp"
+#include "../../test_scale.hpp"
 #include "test_volumes.hpp"
 
 #include <cmath>
@@ -50,7 +50,7 @@ ray_hit first_hit_of_all(const volume& v, const vec3& origin, const vec3& direct
 TEST(PreviewScene, FindsWhatTryingEveryVoxelFinds) {
     std::mt19937 random(7);
     std::uniform_real_distribution<double> unit(0, 1);
-    const int rays = tool_test::is_slow_build() ? 60 : 300;
+    const int rays = tests::is_slow_build() ? 60 : 300;
     int hits = 0;
     using extent = std::array<std::int64_t, 3>;
     for (const extent& e : {extent{9, 8, 7}, extent{33, 5, 17}, extent{1, 1, 1}, extent{70, 3, 65}, extent{16, 16, 16}})

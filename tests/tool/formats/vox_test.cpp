@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "../slow_build.hpp"
+#include "../../test_scale.hpp"
 #include "test_volumes.hpp"
 #include "write/formats/formats.hpp"
 #include "write/formats/palette.hpp"
@@ -209,7 +209,7 @@ TEST_F(Vox, OneModelHoldsEveryVoxelAndItsColor) {
 
 TEST_F(Vox, LargeGridsAreSplitAndPutTogether) {
     // 17 million voxels are split along all axes at once, but in a slow build.
-    const point large = tool_test::is_slow_build() ? point{257, 5, 259} : point{257, 258, 259};
+    const point large = tests::is_slow_build() ? point{257, 5, 259} : point{257, 258, 259};
     for (const up_axis up : {up_axis::y, up_axis::z})
         for (const auto& extent : {point{300, 20, 7}, large, point{20, 600, 3}, point{3, 4, 513}}) {
             volume v = make_colored(extent, 97);
