@@ -11,7 +11,7 @@
 //
 // Needs the library and GLM alone, so that it can be built for any machine:
 //   COMPILER -std=c++20 -O1 -I. tests/golden/hashes/*.cpp -o golden_hashes -pthread
-// With -DVOXELPIPE_GOLDEN_FEW it has the cases of coverages.cpp and distances.cpp alone, which is quick to compile.
+// With -DVOXELPIPE_GOLDEN_FEW it has the cases of cells.cpp, coverages.cpp and distances.cpp alone, which are quick to compile.
 // scripts/golden.sh runs it.
 
 #include "main.hpp"
@@ -25,6 +25,7 @@ using backend_type = voxelpipe::cpu_backend;
 golden::case_table<backend_type> cases() {
 #if defined(VOXELPIPE_GOLDEN_FEW)
     golden::case_table<backend_type> few;
+    golden::add_cells(few);
     golden::add_coverages(few);
     golden::add_distances(few);
     return few;
