@@ -28,7 +28,7 @@ void add_terms(const lattice_triangle& t, int fraction, std::int64_t extent, ter
     vp::core::lift(tri);
     const std::int64_t extents[3] = {extent, extent, extent};
     const vp::core::cell_box box = vp::core::make_cell_box(tri, extents);
-    vp::core::for_each_cell<false, all_terms>(
+    vp::core::for_each_cell<all_terms>(
         tri, box,
         [&](std::int64_t y, std::int64_t z, std::int64_t x, const all_terms& terms) {
             all_terms& sum = sums[{z - box.lo[2], y - box.lo[1], x - box.lo[0]}];

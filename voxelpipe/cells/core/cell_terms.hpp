@@ -200,17 +200,15 @@ VOXELPIPE_HD void add_parts(const cell_triangle<Int>& t, const cut_corners<Int>&
 }
 
 // Calls visit(y, z, i, terms) for each voxel of a pixel in which a part of the triangle lies, relative to its base: i
-// from lo[0] - 1, which stands for all voxels before the box, to hi[0], for all behind it. With OnlyCount the terms are
-// 0.
+// from lo[0] - 1, which stands for all voxels before the box, to hi[0], for all behind it.
 VOXELPIPE_ANY_CALLABLE
-template <bool OnlyCount, class Terms, class Int, class Visit>
+template <class Terms, class Int, class Visit>
 VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_polygon& column, cutting_planes& planes,
                                          cut_corners<Int>& corners, const cell_box& box, const area_ratio& areas,
                                          std::int64_t j, std::int64_t k, Visit&& visit) {
     const std::int64_t y = j << t.fraction, z = k << t.fraction;
     const auto oriented = [&](std::int64_t v) { return t.is_odd ? -v : v; };
-    pixel_sums row{0, 0, 0};
-    if (!OnlyCount) row = pixel_cover<has_moments<Terms>>(t, y, z);
+    pixel_sums row = pixel_cover<has_moments<Terms>>(t, y, z);
     row = {oriented(row.cover), oriented(row.y), oriented(row.z)};
     cell_span span{-1, -1}; // in the lower plane of the lowest voxel
     if (t.reach[0] > 1)
@@ -219,8 +217,7 @@ VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_
         for (int c = 0; c < column.count; ++c)
             if (corner_side(corners.at[column.corner[c]], 0, 0) > 0) span = {0, 0};
     const int num_corners = corners.count;
-    if (!OnlyCount)
-        for (int c = 0; c < column.count; ++c) measure_corner(t, corners, column.corner[c], y, z);
+    for (int c = 0; c < column.count; ++c) measure_corner(t, corners, column.corner[c], y, z);
     const auto cut_at = [&](int plane, std::int64_t place, cut_polygon& poly) {
         const int known = corners.count;
         planes.at[plane] = place << t.fraction;
@@ -245,30 +242,28 @@ VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_
         const std::int64_t upper = i + 1;
         const bool is_last = upper > span.last;
         Terms terms{};
-        if (!OnlyCount) {
-            cut_polygon lower = column;
-            corners.count = num_corners;
-            if (!is_last) cut_at(1, upper, lower);
-            pixel_sums before = row;
-            if (!is_last) {
-                before.cover = oriented(round_to_cell_units(sum_polygon<false>(t, corners, lower, 0).cover));
-                if constexpr (has_moments<Terms>) {
-                    const polygon_moments m = sum_moments<false>(t, corners, lower, 0);
-                    before.y = oriented(round_to_cell_units(m.cover_y));
-                    before.z = oriented(round_to_cell_units(m.cover_z));
-                }
-            }
-            terms.cover = before.cover - so_far.cover;
+        cut_polygon lower = column;
+        corners.count = num_corners;
+        if (!is_last) cut_at(1, upper, lower);
+        pixel_sums before = row;
+        if (!is_last) {
+            before.cover = oriented(round_to_cell_units(sum_polygon<false>(t, corners, lower, 0).cover));
             if constexpr (has_moments<Terms>) {
-                terms.cover_y = before.y - so_far.y;
-                terms.cover_z = before.z - so_far.z;
+                const polygon_moments m = sum_moments<false>(t, corners, lower, 0);
+                before.y = oriented(round_to_cell_units(m.cover_y));
+                before.z = oriented(round_to_cell_units(m.cover_z));
             }
-            so_far = before;
-            if (i != before_box) {
-                if (i != span.first) cut_at(0, i, lower);
-                const std::int64_t corner[3] = {i << t.fraction, y, z};
-                add_parts(t, corners, lower, corner, areas, terms);
-            }
+        }
+        terms.cover = before.cover - so_far.cover;
+        if constexpr (has_moments<Terms>) {
+            terms.cover_y = before.y - so_far.y;
+            terms.cover_z = before.z - so_far.z;
+        }
+        so_far = before;
+        if (i != before_box) {
+            if (i != span.first) cut_at(0, i, lower);
+            const std::int64_t corner[3] = {i << t.fraction, y, z};
+            add_parts(t, corners, lower, corner, areas, terms);
         }
         visit(j, k, i, terms);
         if (is_last) return;
@@ -294,7 +289,7 @@ template <class Int>
 
 // The same for a triangle within one voxel, in closed form: its cover is exact, and so is the numerator of its volume.
 VOXELPIPE_ANY_CALLABLE
-template <bool OnlyCount, class Terms, class Int, class Visit>
+template <class Terms, class Int, class Visit>
 VOXELPIPE_HD void visit_only_cell(const cell_triangle<Int>& t, const cell_box& box, const area_ratio& areas,
                                   Visit&& visit) {
     for (int axis = 1; axis < 3; ++axis)
@@ -303,7 +298,7 @@ VOXELPIPE_HD void visit_only_cell(const cell_triangle<Int>& t, const cell_box& b
     const bool is_before = box.lo[0] > 0, is_behind = !is_before && box.hi[0] <= 0,
                is_within = !is_before && !is_behind;
     Terms terms{};
-    if constexpr (!OnlyCount && (has_moments<Terms> || has_areas<Terms>)) {
+    if constexpr (has_moments<Terms> || has_areas<Terms>) {
         const std::int64_t corner[3] = {0, 0, 0};
         if (is_within) {
             cut_corners<Int> corners;
@@ -359,7 +354,7 @@ template <class Int>
 // Calls visit(y, z, i, terms), as for_each_cell_of_pixel, for the voxels of a layer: of all its pixels, or of the one
 // with this number (one: 0 to most_pixels_of_layer - 1), which there may not be. whole: with its three corners.
 VOXELPIPE_ANY_CALLABLE
-template <bool OnlyCount, class Terms, class Int, class Visit>
+template <class Terms, class Int, class Visit>
 VOXELPIPE_HD void for_each_cell_of_layer(const cell_triangle<Int>& t, const cut_polygon& whole, cutting_planes& planes,
                                          cut_corners<Int>& corners, const cell_box& box, const area_ratio& areas,
                                          const cell_pixels& all, std::int64_t k, std::int64_t one, Visit&& visit) {
@@ -401,7 +396,7 @@ VOXELPIPE_HD void for_each_cell_of_layer(const cell_triangle<Int>& t, const cut_
         }
         if (t.reach[1] > 1 || t.reach[2] > 1)
             if (!meets_inside(t, planes, corners, column)) continue;
-        for_each_cell_of_pixel<OnlyCount, Terms>(t, column, planes, corners, box, areas, j, k, visit);
+        for_each_cell_of_pixel<Terms>(t, column, planes, corners, box, areas, j, k, visit);
     }
 }
 
@@ -414,11 +409,11 @@ template <class Int>
 // Calls visit(y, z, i, terms) for all voxels in which a part of a triangle lies, as for_each_cell_of_pixel. areas: what
 // area_terms need.
 VOXELPIPE_ANY_CALLABLE
-template <bool OnlyCount, class Terms = cell_terms, class Int, class Visit>
+template <class Terms = cell_terms, class Int, class Visit>
 VOXELPIPE_HD void for_each_cell(const cell_triangle<Int>& t, const cell_box& box, Visit&& visit,
                                 const area_ratio& areas = {0, 0.0}) {
     if (is_in_one_cell(t)) {
-        visit_only_cell<OnlyCount, Terms>(t, box, areas, visit);
+        visit_only_cell<Terms>(t, box, areas, visit);
         return;
     }
     cutting_planes planes{};
@@ -426,7 +421,7 @@ VOXELPIPE_HD void for_each_cell(const cell_triangle<Int>& t, const cell_box& box
     const cut_polygon whole = whole_triangle(t, corners);
     const cell_pixels all = pixels_of(t, box);
     for (std::int64_t k = all.z_first; k < all.z_end; ++k)
-        for_each_cell_of_layer<OnlyCount, Terms>(t, whole, planes, corners, box, areas, all, k, -1, visit);
+        for_each_cell_of_layer<Terms>(t, whole, planes, corners, box, areas, all, k, -1, visit);
 }
 
 } // namespace voxelpipe::core

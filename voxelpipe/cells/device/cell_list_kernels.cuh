@@ -98,7 +98,7 @@ __device__ void list_cell_pixel(const list_cell_pixels<Terms>& pass, std::uint32
             if constexpr (core::has_sheets<Terms>) pass.terms[to].triangle = i;
         };
         if (core::is_in_one_cell(t)) {
-            core::visit_only_cell<false, Terms>(t, box, areas, store);
+            core::visit_only_cell<Terms>(t, box, areas, store);
             return;
         }
         const core::cell_pixels all = core::pixels_of(t, box);
@@ -106,8 +106,8 @@ __device__ void list_cell_pixel(const list_cell_pixels<Terms>& pass, std::uint32
         core::cutting_planes planes{};
         core::cut_corners<Int> corners;
         const core::cut_polygon whole = core::whole_triangle(t, corners);
-        core::for_each_cell_of_layer<false, Terms>(t, whole, planes, corners, box, areas, all, all.z_first + k,
-                                                   number - k * width, store);
+        core::for_each_cell_of_layer<Terms>(t, whole, planes, corners, box, areas, all, all.z_first + k,
+                                            number - k * width, store);
     });
 }
 // error: null, or a word that is not 0 where the call has failed; nothing is done then.

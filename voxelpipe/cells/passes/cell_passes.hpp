@@ -51,14 +51,8 @@ namespace voxelpipe::core {
     return s;
 }
 
-// A backend whose threads can keep items before their number is known.
-template <class Backend>
-inline constexpr bool has_collect = requires(Backend& b) {
-    b.template collect<int>(std::uint64_t{0}, [](std::uint64_t, const auto&) {});
-};
-
-// True of a backend that lists terms in its own way, by passes::list_terms_by_pixel(backend, mesh of the scene, keys,
-// counts, term_room).
+// True of a backend that lists terms by list_terms_by_pixel(backend, mesh of the scene, keys, counts, term_room). The
+// threads of another keep terms before their number is known, by Backend::collect and Backend::take.
 template <class Backend>
 inline constexpr bool lists_by_pixel = false;
 
@@ -161,7 +155,11 @@ public:
 private:
     // Lists the terms of all triangles. False if they cannot be numbered.
     [[nodiscard]] bool list_terms(std::uint64_t triangles) {
-        if constexpr (has_collect<Backend>) {
+        if constexpr (lists_by_pixel<Backend>) {
+            num_records_ = list_terms_by_pixel(backend_, scene_.mesh(), keys_of_, scene_.counts(),
+                                               term_room<Backend, terms_type>{keys_, order_, terms_});
+            return num_records_ < most;
+        } else {
             using record = passes::cell_record<terms_type>;
             auto records = backend_.template collect<record>(
                 triangles, passes::collect_cells<terms_type>{scene_.mesh(), keys_of_, scene_.counts()});
@@ -171,24 +169,8 @@ private:
             backend_.take(std::move(records),
                           passes::store_record<terms_type>{keys_.data(), order_.data(),
                                                            checks_size() ? sizes_.data() : nullptr, terms_.data()});
-        } else if constexpr (lists_by_pixel<Backend>) {
-            num_records_ = list_terms_by_pixel(backend_, scene_.mesh(), keys_of_, scene_.counts(),
-                                               term_room<Backend, terms_type>{keys_, order_, terms_});
-            return num_records_ < most;
-        } else {
-            buffer<std::uint64_t> first_term(backend_, triangles + 1);
-            std::uint64_t count = 0;
-            {
-                buffer<std::uint32_t> num_terms(backend_, triangles + 1);
-                backend_.for_each(triangles + 1,
-                                  passes::count_cells<terms_type>{scene_.mesh(), num_terms.data(), scene_.counts()});
-                count = backend_.sum(num_terms, first_term);
-            }
-            if (!make_room(count)) return false;
-            backend_.for_each(triangles, passes::list_cells<terms_type>{scene_.mesh(), keys_of_, first_term.data(),
-                                                                        keys_.data(), order_.data(), terms_.data()});
+            return true;
         }
-        return true;
     }
     [[nodiscard]] bool checks_size() const {
         constexpr std::uint64_t safe = std::uint64_t{1} << 19; // triangles whose covers cannot wrap

@@ -13,7 +13,7 @@ namespace voxelpipe::core::passes {
 
 // Classifies a triangle, and calls visit(y, z, slot, terms) for its terms.
 VOXELPIPE_ANY_CALLABLE
-template <bool OnlyCount, class Terms, class Visit>
+template <class Terms, class Visit>
 VOXELPIPE_HD triangle_class visit_cells(const cell_mesh& mesh, std::uint64_t i, Visit&& visit) {
     const snapped_position a = mesh.corner(i, 0), b = mesh.corner(i, 1), c = mesh.corner(i, 2);
     const triangle_class kind = classify_positions(a, b, c);
@@ -26,10 +26,10 @@ VOXELPIPE_HD triangle_class visit_cells(const cell_mesh& mesh, std::uint64_t i, 
         area_ratio areas{0, 0.0};
         if constexpr (has_areas<Terms>) {
             lift(t);
-            if (!OnlyCount) areas = ratio_of(t, mesh.areas);
+            areas = ratio_of(t, mesh.areas);
         }
         const cell_box box = make_cell_box(t, extent);
-        for_each_cell<OnlyCount, Terms>(
+        for_each_cell<Terms>(
             t, box,
             [&](std::int64_t y, std::int64_t z, std::int64_t x, const Terms& terms) {
                 visit(static_cast<std::uint64_t>(y - box.lo[1]), static_cast<std::uint64_t>(z - box.lo[2]),
@@ -53,26 +53,6 @@ VOXELPIPE_HD inline void count_triangle(const cell_mesh& mesh, std::uint64_t i, 
     if (kind == triangle_class::outside) add_count(counts, cell_count::outside, 1);
 }
 
-// The number of a triangle's terms; 0 behind the last triangle, for the sums.
-template <class Terms>
-struct count_cells {
-    cell_mesh mesh;
-    std::uint32_t* num_terms;
-    std::uint64_t* counts;
-
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        num_terms[i] = 0;
-        if (i == mesh.num_triangles) return;
-        std::uint32_t n = 0;
-        const triangle_class kind =
-            visit_cells<true, Terms>(mesh, i, [&](std::uint64_t, std::uint64_t, std::uint64_t, const Terms&) {
-                n += static_cast<std::uint32_t>(n != ~0u);
-            });
-        num_terms[i] = n;
-        count_triangle(mesh, i, kind, counts);
-    }
-};
-
 // Calls emit(key, terms) for a triangle's terms.
 VOXELPIPE_ANY_CALLABLE
 template <class Terms, class Emit>
@@ -85,38 +65,16 @@ VOXELPIPE_HD triangle_class emit_cells(const cell_mesh& mesh, const cell_keys& k
         emit(keys_of.key(y, z, body, slot), terms);
     };
     VOXELPIPE_CALLS_ANY_END
-    return visit_cells<false, Terms>(mesh, i, visit);
+    return visit_cells<Terms>(mesh, i, visit);
 }
-
-// Stores the terms of counted triangles.
-template <class Terms>
-struct list_cells {
-    cell_mesh mesh;
-    cell_keys keys_of;
-    const std::uint64_t* first_term; // of each triangle
-    std::uint64_t* keys;
-    std::uint32_t* order;
-    Terms* terms;
-
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        std::uint64_t to = first_term[i];
-        if (first_term[i + 1] == to) return;
-        emit_cells<Terms>(mesh, keys_of, i, [&](std::uint64_t key, const Terms& of_voxel) {
-            keys[to] = key;
-            order[to] = static_cast<std::uint32_t>(to);
-            terms[to] = of_voxel;
-            ++to;
-        });
-    }
-};
 
 // |cover| in units of 2^-20, rounded up.
 [[nodiscard]] VOXELPIPE_HD inline std::uint64_t size_of_cover(std::int64_t cover) {
     return (static_cast<std::uint64_t>(cover < 0 ? -cover : cover) + 0xffffffu) >> 24;
 }
 
-// The same where a backend's threads keep items until all of them are counted (Backend::collect): nothing is counted
-// first, and the terms of a voxel that one block of triangles has become one. At most 1024 triangles are a block.
+// What a backend's threads keep until all of them are counted (Backend::collect). The terms of a voxel that one block
+// of triangles has become one. At most 1024 triangles are a block.
 template <class Terms>
 struct cell_record {
     std::uint64_t key;
