@@ -6,6 +6,8 @@
 
 #include "run/batch.hpp"
 
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <csignal>
 #include <set>
@@ -207,12 +209,19 @@ TEST(ToolBatch, ABadModelStopsNothing) {
     all.inputs.push_back(all.folder / "missing.obj");
     std::ofstream(all.folder / "broken.glb") << "glTF, but not really";
     all.inputs.push_back(all.folder / "broken.glb");
+    // No files: what a list names is looked at before any of it is read.
+    for (const char* const name : {"folder", "folder.glb", "folder.obj"}) {
+        fs::create_directories(all.folder / name);
+        all.inputs.push_back(all.folder / name);
+    }
+    ASSERT_EQ(0, ::mkfifo((all.folder / "pipe.glb").c_str(), 0600));
+    all.inputs.push_back(all.folder / "pipe.glb");
     all.add("good2.obj");
     all.write_list();
     const outcome result = all.run_list();
     EXPECT_EQ(result.code, 2);
     EXPECT_NE(result.err.find("missing.obj: bad_model: "), std::string::npos) << result.err;
-    EXPECT_NE(result.out.find("2 done, 0 were finished, 2 failed"), std::string::npos) << result.out;
+    EXPECT_NE(result.out.find("2 done, 0 were finished, 6 failed"), std::string::npos) << result.out;
     int bad = 0;
     for (const json& record : all.manifest()) {
         if (record["status"] == "ok") continue;
@@ -221,10 +230,10 @@ TEST(ToolBatch, ABadModelStopsNothing) {
         EXPECT_FALSE(record["error"].get<std::string>().empty());
         EXPECT_FALSE(record.contains("outputs"));
     }
-    EXPECT_EQ(bad, 2);
+    EXPECT_EQ(bad, 6);
     // Failures are tried again.
     std::ofstream(all.folder / "missing.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-    EXPECT_NE(all.run_list().out.find("1 done, 2 were finished, 1 failed"), std::string::npos);
+    EXPECT_NE(all.run_list().out.find("1 done, 2 were finished, 5 failed"), std::string::npos);
     // A model that needs more than its share of the memory fails by itself.
     models large;
     large.add("cube.obj");
@@ -235,6 +244,27 @@ TEST(ToolBatch, ABadModelStopsNothing) {
     EXPECT_EQ(over.code, 2);
     EXPECT_NE(over.err.find("out_of_memory"), std::string::npos) << over.err;
     EXPECT_NE(over.err.find("50 MiB"), std::string::npos) << over.err; // a quarter of the budget
+}
+
+TEST(ToolBatch, MeshesAreCountedByTheirFaces) {
+    models all;
+    all.add("part.obj");
+    all.write_list();
+    const std::vector<std::string> remesh{
+        "--list", all.folder / "models.txt", "-o", all.folder / "out/{name}.ply", "-r", "16", "--remesh", "--iso",
+        "0.1"};
+    const outcome result = run(all.folder, remesh);
+    ASSERT_EQ(result.code, 0) << result.err;
+    const json counts = all.manifest().at(0)["counts"];
+    EXPECT_GT(counts["faces"], 100);
+    EXPECT_EQ(counts["vertices"].get<int>() - counts["faces"].get<int>() / 2, counts["euler"]);
+    EXPECT_EQ(counts["components"], 1);
+    EXPECT_FALSE(counts.contains("voxels"));
+    EXPECT_NE(result.out.find("part: " + counts["faces"].dump() + " faces, "), std::string::npos) << result.out;
+    std::vector<std::string> with_report = remesh;
+    with_report.emplace_back("--report");
+    EXPECT_NE(run(all.folder, with_report).err.find("--report does not go with --list: see the manifest"),
+              std::string::npos);
 }
 
 TEST(ToolBatch, ARunThatIsKilledGoesOnWhereItStopped) {

@@ -223,6 +223,19 @@ TEST(Distance, VoxelsOfALevelAreThoseOfAtMostIso) {
     EXPECT_EQ(512, lines({}));                         // 8^3 centres
     EXPECT_EQ(512 + 6 * 64, lines({"--iso", "0.25"})); // and the layers a quarter before its faces
     EXPECT_EQ(216, lines({"--iso", "-0.5"}));
+    // Beyond the band, of which nothing is known but that.
+    EXPECT_EQ(8, lines({"--iso", "-1.5"})); // deeper inside
+    for (const auto& [level, band] : {std::pair{"1.5", "4"}, {"2", "5"}, {"-1.75", "4"}}) {
+        const outcome refused = measure(folder, file, "o.xyz", {"--iso", level});
+        EXPECT_EQ(1, refused.code);
+        EXPECT_NE(std::string::npos, refused.err.find(std::string("--iso ") + level +
+                                                      " lies beyond the band of 3 voxels, "
+                                                      "which is 1.5 wide: --band " +
+                                                      band + " or --band whole"))
+            << refused.err;
+    }
+    EXPECT_EQ(0, lines({"--iso", "-2", "--band", "whole"}));
+    EXPECT_EQ(0, measure(folder, file, "o.npy", {"--iso", "2"}).code); // shows no level
     ASSERT_EQ(0, measure(folder, file, "o.png", {"--iso", "0.5", "--image-size", "64x48"}).code);
     ASSERT_EQ(0, measure(folder, file, "o.html").code);
 }

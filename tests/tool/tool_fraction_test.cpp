@@ -408,13 +408,17 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
         refused({"-t", "fraction", "--solid", rule}, "--solid " + rule + " and --target fraction do not go together");
     refused({"-t", "fraction", "--solid", "nonzero", "--vote"}, "--vote and --target fraction");
     refused({"-t", "fraction", "--solid", "nonzero", "--winding"}, "--winding and --target fraction");
+    refused({"-t", "fraction", "--vote"}, "--vote and --target fraction do not go together");
+    refused({"-t", "area", "--winding"}, "--winding and --target area do not go together");
+    refused({"-t", "links", "--coverage", "thin"}, "links lead from each voxel's centre", 1, "o.npz");
+    refused({"-t", "fraction", "--sparse"}, "it shows occupied voxels, which --sparse with cut cells", 1, "o.png");
     refused({"--close-holes"}, "--close-holes goes with --solid, or with --target fraction");
     refused({"-t", "fraction", "--close-holes=0"}, "--close-holes takes the number of edges");
     refused({"-t", "fraction", "--solid", "nonzero", "--close-holes=few"}, "--close-holes takes the number of edges");
     refused({"-t", "fraction", "--coverage", "thin"}, "--coverage and --target fraction");
     refused({"-t", "fraction", "--alpha", "cutoff"}, "--alpha cutoff and --target fraction");
     refused({"-t", "fraction,occupancy", "--sparse"}, "fraction, area and centroid alone, not occupancy");
-    refused({"-t", "fraction", "--solid", "nonzero", "--sparse"}, "--sparse and --target fraction do not go together");
+    refused({"-t", "fraction", "--solid", "nonzero", "--sparse"}, "--sparse, --solid and --target fraction do not go");
     refused({"-t", "fraction", "--threshold", "0.5", "--sparse"}, "hexahedra take a dense grid", 1, "o.vtu");
     refused({"-t", "fraction", "--resume"}, "one piece of work");
     refused({"-t", "fraction", "--levels"}, "--levels and --target fraction", 1, "o.zarr");
@@ -547,7 +551,7 @@ TEST(Slices, HoldOneTargetAndAreNoOtherFormat) {
     refused("{z}.png", {"--distance"}, "slices hold one target");
     refused("{z}.npy", {"-t", "fraction"}, "only .png is a file for each layer");
     refused("a.npy", {"-t", "fraction", "--slice-bits", "8"}, "{z}.png has");
-    refused("{z}.png", {"-t", "fraction", "--slice-bits", "12"}, "--slice-bits");
+    refused("{z}.png", {"-t", "fraction", "--slice-bits", "12"}, "--slice-bits: 8 or 16, not \"12\"");
     // Nor do they replace what the run reads, or another output.
     std::filesystem::create_directories(folder / "m");
     std::filesystem::create_symlink(folder / "m.glb", folder / "m/0003.png");

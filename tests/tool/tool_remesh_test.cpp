@@ -465,6 +465,43 @@ TEST(Remeshing, LevelsGrowTheModel) {
     EXPECT_NEAR(-0.5, least, 1e-3);
 }
 
+// A sheet of 4 by 2, whose box is flat: the grid holds the plate that it becomes, without --padding.
+TEST(Remeshing, GridsGrowWithTheLevel) {
+    const scratch_folder folder;
+    builder file;
+    file.mesh({{"POSITION",
+                file.accessor(std::vector<float>{0, 0, 1, 4, 0, 1, 4, 2, 1, 0, 0, 1, 4, 2, 1, 0, 2, 1}, "VEC3")}});
+    file.write_glb(folder / "m.glb");
+    const auto remesh = [&](std::vector<std::string> more) {
+        more.insert(more.begin(),
+                    {folder / "m.glb", "--remesh", "--iso", "0.25", "--place", "mean", "-o", folder / "o.ply"});
+        return run(folder, more);
+    };
+    const outcome result = remesh({"-r", "40"});
+    ASSERT_EQ(0, result.code) << result.err;
+    const read_surface s = read_surface_ply(folder / "o.ply");
+    EXPECT_TRUE(s.is_closed());
+    glm::dvec3 low(1e9), high(-1e9);
+    double volume = 0;
+    for (const glm::dvec3& p : s.vertices) {
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+    }
+    for (const auto& f : s.faces)
+        volume += glm::dot(s.vertices[f[0]], glm::cross(s.vertices[f[1]], s.vertices[f[2]])) / 6;
+    for (const double off : {low.x + 0.25, low.y + 0.25, low.z - 0.75, high.x - 4.25, high.y - 2.25, high.z - 1.25})
+        EXPECT_NEAR(0, off, 0.02); // means of a tube's crossings lie within it
+    // The sheet, half a tube along its edges, quarters of a ball at its corners.
+    constexpr double pi = 3.14159265358979;
+    EXPECT_NEAR(8 * 0.5 + 12 * pi * 0.0625 / 2 + pi * 4 / 3 * 0.015625, volume, 0.12);
+    // In a grid of its own the mesh ends where the grid does, and that is said.
+    const outcome cut = remesh({"--origin", "0,0,0", "--extent", "10,10,10", "-s", "0.2"});
+    ASSERT_EQ(0, cut.code) << cut.err;
+    EXPECT_NE(std::string::npos, cut.err.find("the surface of --iso leaves the grid")) << cut.err;
+    const outcome held = remesh({"--origin", "-1,-1,0", "--extent", "30,20,10", "-s", "0.2"});
+    EXPECT_EQ(std::string::npos, held.err.find("leaves the grid")) << held.err;
+}
+
 TEST(Remeshing, NothingInsideIsAnEmptyMeshAndAWarning) {
     const scratch_folder folder;
     builder file;
@@ -506,6 +543,8 @@ TEST(Remeshing, WhatDoesNotGoTogetherIsRefused) {
     is_refused({"--remesh", "--points"}, "--points does not go with --remesh");
     is_refused({"--remesh", "--sparse"}, "--sparse does not go with --remesh");
     is_refused({"--remesh", "--iso", "inf"}, "--iso takes a finite distance");
+    is_refused({"--remesh", "--rank", "0", "--world-size", "2"}, "--remesh is one piece of work: no --resume");
+    is_refused({"--remesh"}, "{z} is the number of a layer, and a mesh is one file", 1, "l{z}.ply");
     is_refused({"--remesh", "--backend", "cuda", "--devices", "2"}, "one GPU remeshes", 5);
 }
 

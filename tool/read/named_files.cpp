@@ -90,6 +90,8 @@ void add_obj_files(const fs::path& model, std::vector<fs::path>& files) {
 
 std::vector<fs::path> named_pictures(const fs::path& library, const fs::path& folder) {
     std::vector<fs::path> files;
+    std::error_code unreadable;
+    if (!fs::is_regular_file(library, unreadable)) return files;
     // A picture's name follows options, and may have blanks; it lies where it says, beside the library, or beside the
     // model.
     const auto add_picture = [&](std::string_view rest) {
@@ -120,6 +122,8 @@ std::vector<fs::path> named_pictures(const fs::path& library, const fs::path& fo
 
 std::vector<fs::path> named_files(const fs::path& model) {
     std::vector<fs::path> files;
+    std::error_code error;
+    if (!fs::is_regular_file(model, error)) return files; // a folder, a pipe: the loader says so
     const std::string extension = assimp::lower_extension(model);
     if (extension == ".obj") {
         try {

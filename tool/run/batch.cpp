@@ -141,6 +141,10 @@ work_done work_on(const command_line& all, const listed_model& model, const std:
                             {"triangles_dropped", stats.triangles_dropped},
                             {"fragments", stats.fragments},
                             {"voxels", stats.voxels}};
+        if (const auto& made = result.report.surface; made && result.report.request.remesh)
+            record["counts"] = {{"triangles", stats.triangles},          {"triangles_dropped", stats.triangles_dropped},
+                                {"vertices", made->counts.vertices},     {"faces", made->counts.faces},
+                                {"components", made->counts.components}, {"euler", made->euler}};
         record["peak_memory_bytes"] = result.report.peak_memory;
     }
     if (!result.report.warnings.empty()) record["warnings"] = result.report.warnings;
@@ -368,7 +372,8 @@ int run_batch(const command_line& options) {
                 std::cerr << "voxelize: " << end.model.input.string() << ": " << status << ": "
                           << record.value("error", "") << '\n';
             } else if (!options.quiet) {
-                std::cout << end.model.name << ": " << record["counts"]["voxels"] << " voxels, "
+                const char* const what = record["counts"].contains("faces") ? "faces" : "voxels";
+                std::cout << end.model.name << ": " << record["counts"][what] << ' ' << what << ", "
                           << static_cast<long long>(record["ms"].get<double>()) << " ms\n";
             }
         }

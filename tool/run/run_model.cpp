@@ -21,6 +21,8 @@
 #include "write_bytes.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <iostream>
@@ -163,10 +165,46 @@ void warn_of_part(const bounding_box& bounds, run_report& report) {
             "takes is not what it would take of the whole model");
 }
 
+// The grid around the model; with --remesh --iso D around the model and what grows on it, and an empty voxel beyond.
+voxelpipe::grid grid_of(const command_line& options, const bounding_box& bounds, run_report& report) {
+    const double level = report.request.remesh ? report.request.remesh->level : 0;
+    if (!(level > 0)) return place_grid(options.grid, bounds);
+    bounding_box grown = bounds;
+    grown.low -= level;
+    grown.high += level;
+    grid_request around = options.grid;
+    if (!around.origin) {
+        around.padding = std::max(around.padding, 1);
+        return place_grid(around, grown);
+    }
+    const voxelpipe::grid grid = place_grid(around, bounds);
+    const glm::dvec3 first = grid.part_origin(), last = first + glm::dvec3(grid.extent) * grid.voxel_size;
+    if (!bounding_box{first, last, false}.holds(grown))
+        report.warnings.push_back("the surface of --iso leaves the grid, at whose sides the mesh ends");
+    return grid;
+}
+
+// The level that pictures show of distances lies within their band, because what is further away is not told apart.
+void check_level(const command_line& options, const voxelize_request& request) {
+    if (!request.distance || !request.distance->iso || request.distance->is_whole ||
+        std::none_of(options.outputs.begin(), options.outputs.end(), shows_level))
+        return;
+    const glm::dvec3 side = request.grid.voxel_size;
+    const double largest = std::max({side.x, side.y, side.z}), level = *request.distance->iso,
+                 band = request.distance->band * largest;
+    if (level < band && level >= -band) return;
+    std::array<char, 160> text{};
+    std::snprintf(text.data(), text.size(),
+                  "--iso %g lies beyond the band of %g voxels, which is %g wide: --band %g or --band whole holds it",
+                  level, request.distance->band, band, std::floor(std::abs(level) / largest) + 1);
+    throw grid_error(text.data());
+}
+
 void warn_of_dropped(run_report& report) {
     if (report.stats.triangles_dropped != 0)
         report.warnings.push_back(std::to_string(report.stats.triangles_dropped) +
-                                  " triangles are dropped: a position is not finite, or too far from the grid");
+                                  (report.stats.triangles_dropped == 1 ? " triangle is" : " triangles are") +
+                                  " dropped: a position is not finite, or too far from the grid");
 }
 
 // Draws and writes the slabs of this process.
@@ -271,10 +309,11 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
                std::to_string(UINT32_MAX) + " that can be numbered");
     const bounding_box bounds = stream ? boxes.placed : bounds_of(model, options.voxelize.threads);
     if (bounds.empty && !may_be_empty) refuse("nothing to voxelize has a corner at a finite position");
-    report.request.grid = place_grid(options.grid, bounds);
+    report.request.grid = grid_of(options, bounds, report);
     if (report.request.distance && report.request.distance->at_corners)
         report.request.grid = report.request.grid.at_corners();
     report.request.padding = options.grid.padding;
+    check_level(options, report.request);
     if (stream) {
         const std::size_t known = stream->warnings().size();
         read_textures(*stream, report.request.grid, report.request);

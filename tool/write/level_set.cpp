@@ -174,8 +174,8 @@ std::string cut_band_warning(const volume& v) {
                 z == 0 || z == nz - 1 || y == 0 || y == ny - 1 ? 1 : std::max<std::int64_t>(nx - 1, 1);
             for (std::int64_t x = 0; x < nx && !cut; x += step) cut = is_cut(x, y, z);
         }
-    return cut ? "the band is cut off at the grid's sides, where the level set is not closed: --padding with the "
-                 "band's width keeps it whole"
+    return cut ? "the band is cut off at the grid's sides, where the level set is not closed: --padding of one voxel "
+                 "more than the band keeps it whole"
                : "";
 }
 

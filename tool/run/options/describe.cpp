@@ -439,7 +439,11 @@ void describe_output(CLI::App& app, command_line& options, raw_options& raw) {
         ->group("Files");
     app.add_option("--slice-bits", options.write.slice_bits,
                    "Bits of a pixel of {z}.png: 8 or 16. Default: 8 of occupancy, 16 of fractions")
-        ->check(CLI::IsMember({8, 16}))
+        ->check(CLI::Validator(
+            [](const std::string& text) {
+                return text == "8" || text == "16" ? std::string() : "8 or 16, not \"" + text + '"';
+            },
+            ""))
         ->option_text("N")
         ->group("Files");
     app.add_option("--compression", options.write.compression,

@@ -124,6 +124,14 @@ void understand_solid(command_line& options, const raw_options& raw) {
                                                    {"--winding", raw.winding},
                                                    {"--closing", raw.closing.has_value()},
                                                    {"--fill", !raw.fill.empty()}};
+        const auto measures = [](const std::string& name) {
+            const std::optional<target> id = target_named(lower(name));
+            return id && is_of_cells(*id);
+        };
+        const auto measured = std::find_if(raw.targets.begin(), raw.targets.end(), measures);
+        if (measured != raw.targets.end() && (raw.vote || raw.winding))
+            throw usage_error(std::string(raw.vote ? "--vote" : "--winding") + " and --target " + lower(*measured) +
+                              " do not go together: a voxel is measured by whole winding numbers");
         for (const auto& [name, is_given] : given)
             if (is_given) throw usage_error(std::string(name) + " goes with --solid");
         return;
@@ -223,6 +231,8 @@ void understand_remesh(command_line& options, const raw_options& raw) {
     const auto refuse = [](const char* what, const char* why) {
         throw usage_error(std::string(what) + " does not go with --remesh: " + why);
     };
+    if (raw.report && !options.batch.list.empty())
+        throw usage_error("--report does not go with --list: see the manifest");
     if (raw.distance) refuse("--distance", "one makes a field, the other a mesh");
     if (raw.coverage) refuse("--coverage", "what lies inside is decided at the voxels' centres");
     if (raw.extent_of_solid) refuse("--solid-extent", "a sample is inside or not");
@@ -232,9 +242,12 @@ void understand_remesh(command_line& options, const raw_options& raw) {
     if (options.write.points) refuse("--points", "they are centres of voxels");
     if (options.storage != storage_choice::automatic)
         refuse(options.storage == storage_choice::sparse ? "--sparse" : "--dense", "no voxels are kept");
-    if (options.by_slabs) refuse("--resume", "it is one piece of work, also for several processes");
+    if (options.by_slabs)
+        throw usage_error("--remesh is one piece of work: no --resume, and no processes that share a model");
     for (const std::filesystem::path& output : options.outputs)
-        if (!writes_surface(output))
+        if (output.filename().string().find(layer_place) != std::string::npos)
+            throw usage_error("\"" + output.string() + "\": {z} is the number of a layer, and a mesh is one file");
+        else if (!writes_surface(output))
             throw usage_error("--remesh makes a mesh: \"" + output.string() +
                               "\" is none; there are .glb, .ply, .stl, .obj, .3mf and .npz");
     if (raw.iso && !std::isfinite(*raw.iso)) throw usage_error("--iso takes a finite distance");
@@ -430,7 +443,10 @@ void understand_fractions(command_line& options, const raw_options& raw) {
         if (!request.wants_cells()) return;
     }
     const std::string name = "--target " + name_of_cells(request), together = " and " + name + " do not go together: ";
-    if (raw.coverage) throw usage_error("--coverage" + together + "a voxel's whole volume is measured");
+    if (raw.coverage)
+        throw usage_error(
+            "--coverage" + together +
+            (request.wants_links() ? "links lead from each voxel's centre" : "a voxel's whole volume is measured"));
     if (request.solid) {
         if (request.solid->rule != solid_rule::nonzero)
             throw usage_error(std::string("--solid ") + to_string(request.solid->rule) + together +
@@ -454,11 +470,20 @@ void understand_fractions(command_line& options, const raw_options& raw) {
             std::erase(options.voxelize.targets, target::occupancy);
             std::erase(options.implied, target::occupancy);
         }
+        for (const std::filesystem::path& output : options.outputs)
+            if (find_format(output)->needs_occupancy && !find_format(output)->only_sparse &&
+                std::find(options.implied.begin(), options.implied.end(), target::occupancy) != options.implied.end())
+                throw usage_error(
+                    '"' + output.string() +
+                    "\": it shows occupied voxels, which --sparse with cut cells does not hold: leave out "
+                    "--sparse");
         for (const target id : request.targets)
             if (id != target::fraction && id != target::area && id != target::centroid)
                 throw usage_error("--sparse with cut cells takes the targets fraction, area and centroid alone, not " +
                                   std::string(info_of(id).name));
-        if (request.solid) throw usage_error("--sparse" + together + "with --solid");
+        if (request.solid)
+            throw usage_error("--sparse, --solid and " + name +
+                              " do not go together: sparse fractions are lists of their own");
         if (raw.threshold)
             throw usage_error("--sparse and --threshold do not go together: hexahedra take a dense grid");
     }
@@ -485,7 +510,8 @@ void understand_fractions(command_line& options, const raw_options& raw) {
                               "\": it holds occupied voxels alone, which are those of the surface; --solid nonzero "
                               "beside " +
                               name + " adds the inside" +
-                              (f.has_threshold ? ", --threshold takes voxels by their fractions"
+                              (f.has_threshold && request.wants(target::fraction)
+                                   ? ", --threshold takes voxels by their fractions"
                                : f.only_sparse ? ", --sparse takes what is cut or inside"
                                                : ""));
     }
