@@ -11,7 +11,8 @@
 //
 // Needs the library and GLM alone, so that it can be built for any machine:
 //   COMPILER -std=c++20 -O1 -I. tests/golden/hashes/*.cpp -o golden_hashes -pthread
-// With -DVOXELPIPE_GOLDEN_FEW it has the cases of cells.cpp, coverages.cpp and distances.cpp alone, which are quick to compile.
+// With -DVOXELPIPE_GOLDEN_FEW it has the cases of cells.cpp, coverages.cpp and distances.cpp alone, which are quick to
+// compile.
 // scripts/golden.sh runs it.
 
 #include "main.hpp"
