@@ -179,7 +179,7 @@ nb::tuple remesh_parts(const position_array& positions, const triangle_array& tr
                        const std::vector<std::uint64_t>& first_triangles, const grid& g, const grid& world,
                        const std::string& sign, const std::string& repair_name, const std::string& bodies_name,
                        std::optional<std::uint64_t> max_hole_edges, int closing, const std::string& place_name,
-                       double level, bool quads, std::uint32_t min_component, bool embedded,
+                       double level, bool corners, bool open, bool quads, std::uint32_t min_component, bool embedded,
                        const value_array<float>& vertex_floats, const value_array<float>& triangle_floats,
                        const value_array<std::int64_t>& vertex_integers,
                        const value_array<std::int64_t>& triangle_integers, unsigned threads) {
@@ -192,6 +192,8 @@ nb::tuple remesh_parts(const position_array& positions, const triangle_array& tr
     options.closing = solid.closing;
     options.max_hole_edges = solid.max_hole_edges;
     options.level = level;
+    options.sample = corners ? sample::corner : sample::centre;
+    options.border = open ? border::open : border::closed;
     options.quads = quads;
     options.min_component = min_component;
     options.embedded = embedded;
@@ -327,11 +329,13 @@ nb::tuple extract_list(const voxel_array& voxels, const cube_array& cubes, const
 } // namespace
 
 void bind_remesh(nb::module_& m) {
+    m.def(
+        "at_corners", [](const grid& g) { return g.at_corners(); }, nb::arg("grid"));
     m.def("remesh", &remesh_parts, nb::arg("positions"), nb::arg("triangles"), nb::arg("first_triangles"),
           nb::arg("grid"), nb::arg("world"), nb::arg("sign"), nb::arg("repair"), nb::arg("bodies"),
-          nb::arg("max_hole_edges").none(), nb::arg("closing"), nb::arg("place"), nb::arg("level"), nb::arg("quads"),
-          nb::arg("min_component"), nb::arg("embedded"), nb::arg("vertex_floats"), nb::arg("triangle_floats"),
-          nb::arg("vertex_integers"), nb::arg("triangle_integers"), nb::arg("threads"));
+          nb::arg("max_hole_edges").none(), nb::arg("closing"), nb::arg("place"), nb::arg("level"), nb::arg("corners"),
+          nb::arg("open"), nb::arg("quads"), nb::arg("min_component"), nb::arg("embedded"), nb::arg("vertex_floats"),
+          nb::arg("triangle_floats"), nb::arg("vertex_integers"), nb::arg("triangle_integers"), nb::arg("threads"));
     m.def("extract_bits", &extract_bits, nb::arg("values"), nb::arg("grid"), nb::arg("place"), nb::arg("open"),
           nb::arg("quads"), nb::arg("min_component"), nb::arg("embedded"), nb::arg("threads"));
     m.def("extract_list", &extract_list, nb::arg("voxels"), nb::arg("cubes"), nb::arg("grid"), nb::arg("place"),

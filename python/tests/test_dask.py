@@ -79,6 +79,15 @@ def test_blocks_close_the_holes_of_the_whole():
     check(vp.dask.fractions(mesh, grid, CHUNKS, repair="close_holes"), whole)
 
 
+def test_blocks_go_to_zarr(tmp_path):
+    zarr = pytest.importorskip("zarr")
+    mesh = ball_and_box()
+    grid = vp.fit(mesh, 37)
+    vp.dask.solid(mesh, grid, chunks=CHUNKS).to_zarr(str(tmp_path / "part.zarr"))
+    written = zarr.open(str(tmp_path / "part.zarr"), mode="r")
+    np.testing.assert_array_equal(np.asarray(written[...]), vp.solid(mesh, grid))
+
+
 def test_a_cluster_of_two_processes_gives_the_whole(client):
     mesh = ball_and_box()
     for lazy, whole in calls(mesh, vp.fit(mesh, 40)).values():

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """remesh() and extract(): closed manifolds by trimesh and manifold3d, which know nothing of this library."""
 
+import os
+import subprocess
+
 import numpy as np
 import pytest
 
@@ -218,3 +221,49 @@ def test_bad_attributes():
         tetrahedron = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
         sides = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
         vp.remesh((tetrahedron, sides), vp.fit((tetrahedron, sides), 8), attributes={"rgb": tetrahedron})
+
+
+def test_corners_are_samples_as_distance_has_them():
+    grid = vp.fit((BOX, FACES), 12, padding=4)
+    made = vp.remesh((BOX, FACES), grid, corners=True, place="mean", level=0.1)
+    judge(*made[:2])
+    assert made[0].max() == pytest.approx(1.1, abs=1e-3) and made[0].min() == pytest.approx(-0.1, abs=1e-3)
+    field = vp.distance((BOX, FACES), grid, "whole", corners=True)
+    assert field.shape == tuple(n + 1 for n in grid.shape)
+    same = vp.extract(field, grid, corners=True, level=0.1)
+    np.testing.assert_array_equal(made[0], same[0])
+    np.testing.assert_array_equal(made[1], same[1])
+    np.testing.assert_array_equal(made[2]["cell"], same[2]["cell"])
+    inside = field < 0
+    np.testing.assert_array_equal(vp.remesh((BOX, FACES), grid, corners=True, place="corner")[0], vp.extract(inside, grid, corners=True, place="corner")[0])
+    with pytest.raises(ValueError):
+        vp.extract(field, grid)
+
+
+def test_open_borders_leave_faces_out():
+    grid = vp.Grid((0.25, 0.25, 0.25), (0.25,) * 3, (8, 8, 8))  # the box begins before it
+    closed = vp.remesh((BOX, FACES), grid)
+    judge(*closed[:2])
+    opened = vp.remesh((BOX, FACES), grid, border="open")
+    assert 0 < len(opened[1]) < len(closed[1])
+    with pytest.raises(ValueError, match="border"):
+        vp.remesh((BOX, FACES), grid, border="ajar")
+
+
+@pytest.mark.skipif("VOXELPIPE_TOOL" not in os.environ, reason="VOXELPIPE_TOOL names no voxelize")
+def test_the_tools_arrays_are_those_of_remesh(tmp_path):
+    soup, faces = np.concatenate([BOX, 0.6 + BOX]), np.concatenate([FACES, 8 + FACES])
+    model = tmp_path / "m.obj"
+    model.write_text("".join(f"v {x:g} {y:g} {z:g}\n" for x, y, z in soup) + "".join(f"f {a} {b} {c}\n" for a, b, c in faces + 1))
+    place = ["--origin", "-0.25,-0.25,-0.25", "--extent", "36,35,34", "-s", "0.0625"]
+    grid = vp.Grid((-0.25,) * 3, (0.0625,) * 3, (36, 35, 34))
+    for name in ("sharp", "mean", "corner"):
+        out = tmp_path / f"{name}.npz"
+        subprocess.run([os.environ["VOXELPIPE_TOOL"], model, "--remesh", "--place", name, *place, "-o", out], check=True, capture_output=True)
+        with np.load(out) as file:
+            vertices, triangles, more = vp.remesh((soup, faces), grid, place=name)
+            np.testing.assert_allclose(file["vertices"], vertices, rtol=0, atol=1e-12)
+            np.testing.assert_array_equal(file["triangles"], triangles)
+            for key in ("cell", "sheet", "source"):
+                np.testing.assert_array_equal(file[key], more[key])
+            assert file["normal"].shape == vertices.shape

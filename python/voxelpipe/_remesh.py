@@ -69,6 +69,8 @@ def remesh(
     max_hole_edges: int | None = None,
     place: Place = "sharp",
     level: float = 0.0,
+    corners: bool = False,
+    border: Border = "closed",
     quads: bool = False,
     min_component: int = 0,
     embedded: bool = False,
@@ -80,13 +82,15 @@ def remesh(
     """A closed manifold mesh around what lies inside of any triangles: every edge has two faces, every vertex one fan.
 
     Args:
-        mesh, grid: as in voxelize(). Samples are the centres of voxels.
+        mesh, grid: as in voxelize(). Samples are the centres of voxels, unless `corners` is given.
         sign: what is inside, as `fill` of solid(): "nonzero", "even_odd" or "positive".
         repair, closing, bodies, max_hole_edges: as in solid(), for meshes that are not closed.
         place: where vertices lie: "sharp" where the mesh's planes meet, which keeps creases and corners; "mean" at the mean
             of a cell's crossings; "corner" at the corners of voxels.
         level: the signed distance at which the surface lies, in the mesh's units. Above 0 bodies grow, and a sheet becomes
             a closed plate of twice the level.
+        corners: samples at the corners of the voxels, one more along each axis, as in distance().
+        border: "closed": what lies beyond the grid's samples is outside; "open": faces that reach there are left out.
         quads: (m, 4) in place of (m, 3).
         min_component: components of fewer vertices are left out.
         embedded: triangles that intersect each other are looked for, and their vertices moved to the mean of their cell's
@@ -120,6 +124,7 @@ def remesh(
         ("repair", repair, Repair),
         ("bodies", bodies, Bodies),
         ("place", place, Place),
+        ("border", border, Border),
     ):
         check_choice(what, value, choices)
     _check_numbers(level, min_component)
@@ -138,7 +143,7 @@ def remesh(
             m.triangles,
             list(m.first_triangles),
             where,
-            grid,
+            _core.at_corners(grid) if corners else grid,
             sign,
             repair,
             bodies,
@@ -146,6 +151,8 @@ def remesh(
             closing,
             place,
             float(level),
+            bool(corners),
+            border == "open",
             quads,
             min_component,
             bool(embedded),
@@ -158,7 +165,8 @@ def remesh(
             columns[column] = floats[:, k] if k < num_floats else integers[:, k - num_floats]
     vertices, faces, cell, sheet, source, counts = made
     take_counts(counts, status)
-    _warn_of_holes(counts, f" of {grid.shape[0] * grid.shape[1]} rows of samples", repair)
+    rows = (grid.shape[0] + corners) * (grid.shape[1] + corners)
+    _warn_of_holes(counts, f" of {rows} rows of samples", repair)
     if len(source) != len(vertices):
         source = np.full(len(vertices), -1, np.int64)
     more = {"cell": cell, "sheet": sheet, "source": source}
@@ -173,6 +181,7 @@ def extract(
     *,
     place: Place = "mean",
     level: float = 0.0,
+    corners: bool = False,
     border: Border = "closed",
     quads: bool = False,
     min_component: int = 0,
@@ -186,10 +195,11 @@ def extract(
         values: bool (nz, ny, nx): the voxels that are inside. Or floats, such as those of distance(): what is below
             `level` is inside; NaN is outside. Or lists of what is inside, whose memory is that of the surface: voxels (n, 3),
             as a VoxelList, the result of sparse() or that of tiles().
-        grid: the grid of the values; a value lies at the centre of its voxel.
+        grid: the grid of the values; a value lies at the centre of its voxel, unless `corners` is given.
         place: where vertices lie in their cells: "mean" at the mean of the cell's crossings, "corner" at the corners of
             voxels. "sharp" has no planes here, and is "mean".
         level: of floats.
+        corners: values lie at the corners of the grid's voxels, (nz + 1, ny + 1, nx + 1), as those of distance(corners=True).
         border: "closed": what lies beyond the grid is outside; "open": faces that reach there are left out.
         quads, min_component, embedded, threads, status: as in remesh().
 
@@ -204,6 +214,8 @@ def extract(
     check_choice("place", place, Place)
     check_choice("border", border, Border)
     _check_numbers(level, min_component)
+    if corners:
+        grid = _core.at_corners(grid)
     is_pair = isinstance(values, tuple) and len(values) == 2
     array = np.asarray(values[0] if is_pair else values)
     if is_pair or (array.ndim == 2 and np.issubdtype(array.dtype, np.integer)):
