@@ -224,7 +224,7 @@ def test_bad_attributes():
 
 
 def test_corners_are_samples_as_distance_has_them():
-    grid = vp.fit((BOX, FACES), 12, padding=4)
+    grid = vp.fit((BOX, FACES), voxel_size=1 / 12, padding=4)
     made = vp.remesh((BOX, FACES), grid, corners=True, place="mean", level=0.1)
     judge(*made[:2])
     assert made[0].max() == pytest.approx(1.1, abs=1e-3) and made[0].min() == pytest.approx(-0.1, abs=1e-3)
