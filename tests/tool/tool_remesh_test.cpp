@@ -502,6 +502,26 @@ TEST(Remeshing, GridsGrowWithTheLevel) {
     EXPECT_EQ(std::string::npos, held.err.find("leaves the grid")) << held.err;
 }
 
+// Far from 0, where floats are whole numbers and voxels are halves.
+TEST(Remeshing, StlSaysThatItsFloatsMergeVertices) {
+    const scratch_folder folder;
+    surface_tests::host_mesh box = surface_tests::box(glm::vec3(16777216.0F), glm::vec3(16777316.0F));
+    std::ofstream file(folder / "m.obj");
+    file.precision(9);
+    for (const glm::vec3& p : box.positions) file << "v " << p.x << ' ' << p.y << ' ' << p.z << '\n';
+    for (const glm::uvec3& t : box.triangles) file << "f " << t.x + 1 << ' ' << t.y + 1 << ' ' << t.z + 1 << '\n';
+    file.close();
+    const auto remesh = [&](const std::string& name) {
+        const outcome result = run(folder, {folder / "m.obj", "--remesh", "-r", "200", "--padding", "2", "--place",
+                                            "mean", "-o", folder / name});
+        EXPECT_EQ(0, result.code) << result.err;
+        return result.err;
+    };
+    const std::string warning = "the floats of .stl merge vertices of this mesh";
+    EXPECT_NE(std::string::npos, remesh("o.stl").find(warning));
+    EXPECT_EQ(std::string::npos, remesh("o.ply").find(warning));
+}
+
 TEST(Remeshing, NothingInsideIsAnEmptyMeshAndAWarning) {
     const scratch_folder folder;
     builder file;
