@@ -157,3 +157,17 @@ def test_a_mean_does_not_depend_on_the_order_of_triangles(scene):
     a = vp.bake((v, f), grid, {"a": values})["a"]
     b = vp.bake((v, f[order]), grid, {"a": values[order]})["a"]
     assert a.tobytes() == b.tobytes()
+
+
+def test_fill_is_a_value_of_the_type(scene):
+    vertices, triangles = box((0, 0, 0), (1, 1, 1))
+    grid = vp.fit((vertices, triangles), 6)
+    for dtype, fill in ((np.int8, 300), (np.int32, 1.7), (np.uint32, -1), (np.int64, 2**70), (np.uint8, np.nan)):
+        with pytest.raises(ValueError, match="fill is a whole number from"):
+            vp.bake((vertices, triangles), grid, {"a": np.zeros(len(triangles), dtype)}, fill=fill, per={"a": "triangle"})
+    with pytest.raises(TypeError, match="fill is a number"):
+        vp.bake((vertices, triangles), grid, {"a": np.zeros(len(triangles))}, fill=None, per={"a": "triangle"})
+    made = vp.bake((vertices, triangles), grid, {"a": np.ones(len(triangles), np.uint64)}, fill=2**63, per={"a": "triangle"})["a"]
+    assert made.dtype == np.uint64 and made.max() == 2**63
+    with pytest.raises(ValueError, match="points or lines"):
+        vp.bake(vp.points(np.eye(3)), grid, {"a": np.array([5, 6, 7])})

@@ -196,3 +196,12 @@ def test_nor_does_a_worker_that_dies(tmp_path, client):
     assert [o.result for o in outcomes] == [expected, None, expected]
     assert outcomes[1].error.startswith("KilledWorker")
     assert [o.path for o in outcomes] == [str(p) for p in (a, killer, b)]
+
+
+def test_what_workers_cannot_have_is_refused():
+    mesh = ball_and_box()
+    grid = vp.fit(mesh, 16)
+    with pytest.raises(ValueError, match='bodies is "all"'):
+        vp.dask.fractions(mesh, grid, CHUNKS, bodies="each")
+    with pytest.raises(ValueError, match="no file that workers could open"):
+        vp.dask.voxelize(vp.instances(mesh[0], np.stack([np.eye(4)])), grid, CHUNKS)

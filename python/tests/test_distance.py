@@ -149,3 +149,26 @@ def test_points_that_have_no_distance_are_counted():
         vp.distance_at(mesh, at, repair="vote")
     with pytest.raises(ValueError, match="nonzero"):
         vp.distance_at(mesh, at, sign="even_odd", repair="winding")
+
+
+def test_points_in_double_far_from_the_origin():
+    """Vertices that single precision holds, and points that it does not."""
+    vertices, triangles = box(np.add(LOW, 2**21), np.add(HIGH, 2**21))
+    assert np.array_equal(np.float32(vertices), vertices)
+    grid = vp.Grid((2**21,) * 3, (0.125,) * 3, (56, 60, 64))
+    at = samples(grid)
+    assert not np.array_equal(at.astype(np.float32), at)
+    field = vp.distance((vertices, triangles), grid, "whole")
+    np.testing.assert_array_equal(vp.distance_at((vertices, triangles), at.reshape(-1, 3), grid), field.reshape(-1))
+    single = (np.asarray(vertices, np.float32), triangles)
+    np.testing.assert_array_equal(vp.distance_at(single, at.reshape(-1, 3), grid), field.reshape(-1))
+
+
+def test_a_flood_of_a_grid_within_the_mesh_is_refused():
+    mesh = box((-2, -2, -2), (2, 2, 2))
+    grid = vp.Grid((-0.5,) * 3, (0.125,) * 3, (8, 8, 8))
+    for call in (vp.solid, vp.distance, vp.remesh, vp.tiles):
+        with pytest.raises(ValueError, match="crop_without_whole|whole|within"):
+            call(mesh, grid, repair="exterior")
+    with pytest.raises(ValueError):
+        vp.sparse(mesh, grid, solid="nonzero", repair="exterior")

@@ -270,3 +270,14 @@ def test_the_tools_arrays_are_those_of_remesh(tmp_path):
             for key in ("cell", "sheet", "source"):
                 np.testing.assert_array_equal(file[key], more[key])
             assert file["normal"].shape == vertices.shape
+
+
+def test_levels_of_doubles_are_those_that_doubles_have():
+    grid = vp.Grid((0, 0, 0), (1,) * 3, (8, 8, 8))
+    ramp = np.zeros(grid.shape) + np.arange(8.0) * 1e-3
+    near = vp.extract(ramp, grid, level=3.5e-3)
+    far = vp.extract(ramp + 1e6, grid, level=1e6 + 3.5e-3)
+    np.testing.assert_allclose(far[0], near[0], rtol=0, atol=1e-3)
+    assert far[1].shape == near[1].shape
+    signs = np.where(np.arange(8) < 3, -1e-60, 1e-60) + np.zeros(grid.shape)
+    assert vp.extract(signs, grid)[1].shape == vp.extract(np.sign(signs), grid)[1].shape

@@ -203,7 +203,7 @@ def test_bad_options():
     for name, value in (("fill", "odd"), ("extent", "all"), ("repair", "glue"), ("bodies", "some")):
         with pytest.raises(ValueError, match=f"{name} is one of"):
             vp.solid(mesh, grid, **{name: value})
-    with pytest.raises(ValueError, match="solid options"):
+    with pytest.raises(ValueError, match="closing is 0 to 64, not 65"):
         vp.solid(mesh, grid, repair="exterior", closing=65)
     with pytest.raises(ValueError, match="crop"):
         vp.solid(mesh, grid.crop((0, 0, 0), (4, 4, 4)), repair="exterior")

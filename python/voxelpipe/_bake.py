@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, Mapping, Sequence, overload
 
 import numpy as np
@@ -104,6 +106,8 @@ def _attribute(name: str, given: Any, mesh: Mesh | DeviceMesh, blend: Any, per: 
 
 
 def _attributes(m: Mesh | DeviceMesh, values: Mapping[str, Any], blend: Any, per: Any) -> list[_Attribute]:
+    if values and isinstance(m, ModelMesh) and not len(m.triangles) and len(m.scene.lines):
+        raise ValueError("a model of points or lines has no triangles that values could be of; it has values by itself alone")
     for what, given in (("blend", blend), ("per", per)):
         if given is None or (what == "blend" and isinstance(given, str)):
             continue
@@ -303,12 +307,17 @@ def bake(
     }
 
 
-def _fill_of(a: _Attribute, fill: float) -> Any:
-    """The fill as it becomes the attribute's type."""
-    if a.is_integer:
-        return np.int64(int(fill)).astype(a.dtype)
-    single = np.float32(fill)
-    return np.rint(single).astype(a.dtype) if a.dtype.kind in "iu" else single
+def _fill_of(a: _Attribute, fill: Any) -> Any:
+    """The fill as it becomes the attribute's type. Raises TypeError or ValueError for one that the type does not hold."""
+    if isinstance(fill, bool) or not isinstance(fill, Real):
+        raise TypeError(f"fill is a number, not {type(fill).__name__}")
+    if a.dtype.kind not in "iu":
+        return np.float32(fill)
+    holds = np.iinfo(a.dtype)
+    whole = math.isfinite(fill) and int(fill) == fill
+    if not whole or not holds.min <= int(fill) <= holds.max:
+        raise ValueError(f"fill is a whole number from {holds.min} to {holds.max} for {a.name!r}, which is {a.dtype}, not {fill!r}")
+    return a.dtype.type(int(fill))
 
 
 @overload

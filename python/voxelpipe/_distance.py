@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from numbers import Real
 from typing import Any, Literal
 
 import numpy as np
@@ -12,16 +13,29 @@ from . import _core
 from ._core import Grid
 from ._device import DeviceMesh
 from ._fit import fit
-from ._mesh import Mesh, as_mesh
-from ._solid import OpenMeshWarning
+from ._mesh import Mesh, ModelMesh, as_mesh
+from ._solid import OpenMeshWarning, refuse_grid_within
 from ._surface import take_counts
-from ._types import Bodies, MeshLike, Repair, Sign, check_call, check_choice, check_grid, check_status, check_threads
+from ._types import (
+    Bodies,
+    MeshLike,
+    Repair,
+    Sign,
+    check_call,
+    check_choice,
+    check_grid,
+    check_solid_numbers,
+    check_status,
+    check_threads,
+)
 
 
 def _host_mesh(mesh: MeshLike, what: str = "distances") -> Mesh:
     m = as_mesh(mesh)
     if isinstance(m, DeviceMesh):
         raise TypeError(f"{what} are computed on the CPU: copy the mesh to the host, as with .cpu() or .get()")
+    if isinstance(m, ModelMesh) and not len(m.triangles) and len(m.scene.lines):
+        raise ValueError(f"a model of points or lines has no triangles, which {what} are of")
     return m
 
 
@@ -86,9 +100,13 @@ def distance(
             raise ValueError(f'band is a number of voxels or "whole", not {band!r}')
         voxels = 0.0
     else:
+        if isinstance(band, bool) or not isinstance(band, Real):
+            raise TypeError(f"band is a number of voxels or \"whole\", not {type(band).__name__}")
         voxels = float(band)
-        if not (math.isfinite(voxels) and voxels > 0):
+        if not (math.isfinite(voxels) and 0 < voxels <= 1e9):
             raise ValueError(f"band is a number of voxels above 0, or \"whole\", not {band!r}")
+    check_solid_numbers(max_hole_edges, closing)
+    corners = bool(corners)
     m = _host_mesh(mesh)
     positions, where = m.positions(grid)
     shape = tuple(n + corners for n in grid.shape)
@@ -110,6 +128,8 @@ def distance(
         numbers,
         threads,
     )
+    if repair == "exterior" and not (out < 0).any():
+        refuse_grid_within(m, grid, repair, bodies, closing, threads)
     take_counts(counts, status)
     _warn_of_holes(counts, f" of {shape[0] * shape[1]} rows of samples", repair)
     if numbers is None:
@@ -151,6 +171,11 @@ def distance_at(
     """
     check_threads(threads)
     check_status(status)
+    for what, value, choices in (("sign", sign, Sign), ("repair", repair, Repair), ("bodies", bodies, Bodies)):
+        check_choice(what, value, choices)
+    if repair in ("exterior", "vote"):
+        raise ValueError(f'repair is one of "none", "close_holes" and "winding" here, not {repair!r}, which looks at a grid')
+    check_solid_numbers(max_hole_edges, 0)
     if grid is not None:
         check_grid(grid, "distance_at")
     m = _host_mesh(mesh)
@@ -162,6 +187,9 @@ def distance_at(
     chosen = grid if grid is not None else fit(mesh, 1024)
     positions, where, reference = m.placed(chosen)
     with np.errstate(over="ignore", invalid="ignore"):
+        finite = at[np.isfinite(at)]
+        if not any(reference) and (finite.astype(np.float32) != finite).any():
+            positions, where, reference = m.relative(chosen)
         if any(reference):
             at = at.astype(np.float64) - np.asarray(reference)
         single = np.ascontiguousarray(at, np.float32)

@@ -9,7 +9,7 @@ from typing import Any, Mapping
 import numpy as np
 
 from ._arrays import to_numpy
-from ._axes import as_voxels
+from ._axes import as_voxels, zyx
 from ._core import Grid
 
 
@@ -45,6 +45,19 @@ def check_shapes(values: Any, arrays: Mapping[str, np.ndarray], occupied: Any, g
     for name, shape in shapes.items():
         if shape[:3] != grid.shape or len(shape) > 4 or (name == "occupied" and len(shape) != 3):
             raise ValueError(f"{name} has the shape {shape}, the grid's is {grid.shape} (nz, ny, nx)")
+
+
+def check_list(values: Any, occupied: Any, grid: Grid) -> None:
+    """Raises TypeError, ValueError or IndexError for a list that is none of sparse(), or does not fit the grid."""
+    if not isinstance(values[1], Mapping):
+        raise TypeError("a list is (voxels, values by name), as sparse() returns it; cubes of tiles() go into extract() alone")
+    if occupied is not None:
+        raise ValueError("occupied is of dense arrays; the voxels of a list are those that it names")
+    voxels = as_voxels(values[0], "voxels")
+    zyx(grid, voxels)  # IndexError for one that lies outside
+    for name, a in values[1].items():
+        if len(a) != len(voxels):
+            raise ValueError(f"{name} has {len(a)} rows for {len(voxels)} voxels")
 
 
 def listed(values: Any, occupied: Any, grid: Grid) -> tuple[np.ndarray, dict[str, np.ndarray]]:

@@ -59,8 +59,12 @@ class Mesh:
         """
         if self.vertices.dtype == np.float32:
             return self.vertices, grid, (0.0, 0.0, 0.0)
+        return self.relative(grid)
+
+    def relative(self, grid: Grid) -> tuple[np.ndarray, Grid, Sequence[float]]:
+        """As placed(), with the origin taken away from single precision too: for points that it does not hold."""
         with np.errstate(over="ignore", invalid="ignore"):
-            relative = (self.vertices - np.asarray(grid._whole_origin)).astype(np.float32)
+            relative = (self.vertices.astype(np.float64, copy=False) - np.asarray(grid._whole_origin)).astype(np.float32)
         return np.ascontiguousarray(relative), grid._relative_to_origin(), grid._whole_origin
 
 
@@ -73,6 +77,9 @@ class ModelMesh(Mesh):
     def placed(self, grid: Grid) -> tuple[np.ndarray, Grid, Sequence[float]]:
         positions, where, reference = self.scene.positions(grid)
         return positions, where, reference
+
+    def relative(self, grid: Grid) -> tuple[np.ndarray, Grid, Sequence[float]]:
+        return self.placed(grid)  # relative where the model lies far from 0
 
 
 def _as_it_is(a: np.ndarray) -> np.ndarray:
@@ -153,6 +160,9 @@ def as_mesh(mesh: MeshLike) -> Mesh | DeviceMesh:
             only = Model(os.fspath(only), read_scene(os.fspath(only), False, 3))
         if isinstance(only, Model):
             return _model_mesh(only)
+    for i, part in enumerate(parts):
+        if isinstance(part, Model) and not len(part.faces) and len(part.lines):
+            raise ValueError(f"part {i} of the list is a model of points or lines, which is drawn by itself alone")
     pairs = [_parts_of(part) for part in parts]
     if any(is_on_device(a) for pair in pairs for a in pair):
         return as_device_mesh(pairs)

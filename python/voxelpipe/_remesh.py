@@ -12,8 +12,22 @@ from ._axes import as_voxels
 from ._bake import _attributes, _Attribute
 from ._core import Grid
 from ._distance import _host_mesh, _warn_of_holes
+from ._solid import refuse_grid_within
 from ._surface import take_counts
-from ._types import Bodies, Border, Fill, MeshLike, Per, Place, Repair, check_call, check_choice, real_number, whole_number
+from ._types import (
+    Bodies,
+    Border,
+    Fill,
+    MeshLike,
+    Per,
+    Place,
+    Repair,
+    check_call,
+    check_choice,
+    check_solid_numbers,
+    real_number,
+    whole_number,
+)
 
 
 def _check_numbers(level: float, min_component: int) -> None:
@@ -128,7 +142,8 @@ def remesh(
     ):
         check_choice(what, value, choices)
     _check_numbers(level, min_component)
-    m = _host_mesh(mesh)
+    check_solid_numbers(max_hole_edges, closing)
+    m = _host_mesh(mesh, "remeshes")
     taken = [name for name in attributes or {} if name in ("cell", "sheet", "source")]
     if taken:
         raise ValueError(f"{taken[0]!r} is a result of remesh() by itself; give the attribute another name")
@@ -153,7 +168,7 @@ def remesh(
             float(level),
             bool(corners),
             border == "open",
-            quads,
+            bool(quads),
             min_component,
             bool(embedded),
             *arrays,
@@ -164,6 +179,8 @@ def remesh(
         for k, column in enumerate(order):
             columns[column] = floats[:, k] if k < num_floats else integers[:, k - num_floats]
     vertices, faces, cell, sheet, source, counts = made
+    if not len(faces):
+        refuse_grid_within(m, grid, repair, bodies, closing, threads)
     take_counts(counts, status)
     rows = (grid.shape[0] + corners) * (grid.shape[1] + corners)
     _warn_of_holes(counts, f" of {rows} rows of samples", repair)
@@ -173,6 +190,32 @@ def remesh(
     for i, a in enumerate(given):
         more[a.name] = a.typed(m, np.stack([columns[i, c] for c in range(a.values.shape[1])], axis=1))
     return m.to_caller(vertices), _faces_for(m.to_caller, faces), {k: m.to_caller(v) for k, v in more.items()}
+
+
+def _as_cubes(cubes: Any) -> np.ndarray:
+    """Those of tiles() as int32 (m, 4): the first voxel and the side."""
+    a = to_numpy(cubes, "cubes")
+    if a.dtype.kind not in "iu":
+        raise TypeError(f"cubes are integers (m, 4), as tiles() gives them, not {a.dtype}")
+    if a.ndim != 2 or a.shape[1] != 4:
+        raise ValueError(f"cubes are an array (m, 4), not {a.shape}")
+    wide = (a < -(2**31)) | (a >= 2**31)
+    if wide.any():
+        raise IndexError(f"cube {int(np.argmax(wide.any(axis=1)))} leaves the grid")
+    return np.ascontiguousarray(a, np.int32)
+
+
+def _as_field(array: np.ndarray, level: float) -> tuple[np.ndarray, float]:
+    """The field in float32, and its level. Of doubles the level is taken away first, so that what lies below it stays so."""
+    if array.dtype.itemsize <= 4:
+        return np.ascontiguousarray(array, np.float32), level
+    with np.errstate(over="ignore", invalid="ignore"):
+        above = array.astype(np.float64, copy=False) - level
+        field = np.ascontiguousarray(above, np.float32)
+    lost = (above < 0) & (field == 0)
+    if lost.any():
+        field[lost] = -np.finfo(np.float32).tiny
+    return field, 0.0
 
 
 def extract(
@@ -223,19 +266,19 @@ def extract(
             raise ValueError("lists of voxels have no level")
         cubes = np.empty((0, 4), np.int32)
         if is_pair and not isinstance(values[1], Mapping):
-            cubes = np.ascontiguousarray(to_numpy(values[1], "cubes"), np.int32).reshape(-1, 4)
+            cubes = _as_cubes(values[1])
         made = _core.extract_list(
-            as_voxels(array), cubes, grid, place, border == "open", quads, min_component, bool(embedded), threads
+            as_voxels(array), cubes, grid, place, border == "open", bool(quads), min_component, bool(embedded), threads
         )
     elif array.dtype == np.bool_:
         if level != 0:
             raise ValueError("bool values have no level")
         inside = np.ascontiguousarray(array).view(np.uint8)
-        made = _core.extract_bits(inside, grid, place, border == "open", quads, min_component, bool(embedded), threads)
+        made = _core.extract_bits(inside, grid, place, border == "open", bool(quads), min_component, bool(embedded), threads)
     elif np.issubdtype(array.dtype, np.floating):
-        field = np.ascontiguousarray(array, np.float32)
+        field, level = _as_field(array, float(level))
         made = _core.extract_field(
-            field, grid, place, float(level), border == "open", quads, min_component, bool(embedded), threads
+            field, grid, place, level, border == "open", bool(quads), min_component, bool(embedded), threads
         )
     else:
         raise TypeError(f"values are bool, which voxels are inside, floats, or lists of voxels (n, 3), not {array.dtype}")

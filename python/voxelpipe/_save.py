@@ -19,7 +19,7 @@ from ._arrays import to_numpy
 from ._axes import as_voxels, dense
 from ._core import Grid
 from ._inputs import refuse_input
-from ._listed import check_shapes, is_list, listed, named, occupied_of
+from ._listed import check_list, check_shapes, is_list, listed, named, occupied_of
 from ._types import Up, check_choice, check_grid, check_picture, check_threads, whole_number
 from ._view import view
 
@@ -316,10 +316,12 @@ def save(
     """
     check_grid(grid, "save")
     check_threads(threads)
-    whole_number("compression", compression, 0, "0 to 9")
+    whole_number("compression", compression, 0, "0 to 9", 9)
     whole_number("pieces", pieces)
     if up is not None:
         check_choice("up", up, Up)
+    if is_list(values):
+        check_list(values, occupied, grid)
     target = os.fspath(path)
     extension = os.path.splitext(target)[1].lower()
     if "{z}" in os.path.basename(target):

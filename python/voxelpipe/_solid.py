@@ -22,7 +22,7 @@ from ._types import (
     TensorMesh,
     check_call,
     check_choice,
-    whole_number,
+    check_solid_numbers,
 )
 
 
@@ -38,6 +38,17 @@ def _diagnose(m: Any, grid: Grid, bodies: str, closing: int, threads: int) -> di
     return _core.diagnose_repair(
         positions, m.triangles, list(m.first_triangles), where, bodies, closing, threads
     )
+
+
+def refuse_grid_within(m: Any, grid: Grid, repair: str, bodies: str, closing: int, threads: int) -> None:
+    """For results that have nothing inside: raises ValueError, as solid() does, where repair="exterior" flooded a grid that
+    lies within the mesh."""
+    if repair != "exterior":
+        return
+    try:
+        _diagnose(m, grid, bodies, closing, threads)
+    except MemoryError:  # nothing is known
+        pass
 
 
 def _entry(flood: dict[str, int]) -> str:
@@ -83,9 +94,7 @@ def check_options(fill: Any, extent: Any, repair: Any, bodies: Any, max_hole_edg
     check_choice("extent", extent, Extent)
     check_choice("repair", repair, Repair)
     check_choice("bodies", bodies, Bodies)
-    if max_hole_edges is not None:
-        whole_number("max_hole_edges", max_hole_edges)
-    whole_number("closing", closing)
+    check_solid_numbers(max_hole_edges, closing)
 
 
 def solid_voxels(m: Any, grid: Grid, options: Any, as_tiles: bool,
@@ -98,6 +107,8 @@ def solid_voxels(m: Any, grid: Grid, options: Any, as_tiles: bool,
     voxels, tiles, counts = _core.solid_list(
         positions, m.triangles, list(m.first_triangles), where, *options, as_tiles, threads
     )
+    if len(voxels) == 0 and len(tiles) == 0:
+        refuse_grid_within(m, grid, options[2], options[3], options[5], threads)
     if counts["open_rows"] and options[2] in ("none", "close_holes", "winding"):
         warnings.warn(
             f"the mesh is not closed: {counts['open_rows']} rows of voxels do not balance, and what lies behind a hole is in "

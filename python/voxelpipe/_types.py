@@ -137,15 +137,15 @@ def check_grid(grid: Any, call: str) -> Grid:
     raise TypeError(f"grid is a Grid, as fit() makes it, not {type(grid).__name__}{hint}")
 
 
-def whole_number(what: str, value: Any, least: int = 0, expected: str = "") -> int:
-    """Raises TypeError for what is no whole number, ValueError for one that is too small."""
+def whole_number(what: str, value: Any, least: int = 0, expected: str = "", most: int = 2**31 - 1) -> int:
+    """Raises TypeError for what is no whole number, ValueError for one that is too small or too large."""
     try:
         n = operator.index(value)
     except TypeError:
         if isinstance(value, float):
             raise ValueError(f"{what} is a whole number, not {value!r}") from None
         raise TypeError(f"{what} is a whole number, not {type(value).__name__}") from None
-    if n < least:
+    if n < least or n > most:
         raise ValueError(f"{what} is {expected or f'{least} or more'}, not {n}")
     return n
 
@@ -175,6 +175,12 @@ def check_picture(size: Any, azimuth: Any, elevation: Any, zoom: Any) -> None:
 
 def check_threads(threads: Any) -> int:
     return whole_number("threads", threads, 0, "0 (all cores) or more")
+
+
+def check_solid_numbers(max_hole_edges: Any, closing: Any) -> None:
+    if max_hole_edges is not None:
+        whole_number("max_hole_edges", max_hole_edges, most=2**64 - 1)
+    whole_number("closing", closing, 0, "0 to 64", 64)
 
 
 def check_status(status: Any) -> None:

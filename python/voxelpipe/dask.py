@@ -51,6 +51,8 @@ def _portable(mesh: Any) -> Any:
     if isinstance(mesh, (str, os.PathLike)):
         return os.path.abspath(os.fspath(mesh))
     if isinstance(mesh, Model):
+        if not os.path.isfile(mesh.path):
+            raise ValueError(f"{mesh!r} is of no file that workers could open: give vertices and triangles")
         return os.path.abspath(mesh.path)
     vertices, triangles = _parts_of(mesh)
     if is_on_device(vertices) or is_on_device(triangles):
@@ -191,12 +193,18 @@ def fractions(
 
     Args:
         mesh, grid, chunks, threads: as in voxelize() here.
-        bodies, repair, max_hole_edges: as in voxelpipe.fractions(); each block closes the holes of the whole mesh.
+        bodies: "all". "each" has an axis more, and is voxelpipe.fractions()'s.
+        repair, max_hole_edges: as in voxelpipe.fractions(); each block closes the holes of the whole mesh.
+
+    Raises:
+        ValueError: for bodies="each".
 
     Example:
         >>> density = vp.dask.fractions("part.stl", vp.fit("part.stl", 2048), chunks=256)
         >>> density.map_blocks(np.sqrt).to_zarr("density.zarr")
     """
+    if bodies != "all":
+        raise ValueError(f'bodies is "all" for blocks (nz, ny, nx), not {bodies!r}: take voxelpipe.fractions()')
     options = {"bodies": bodies, "repair": repair, "max_hole_edges": max_hole_edges, "threads": threads}
     return _array(mesh, grid, chunks, np.float32, _fractions.fractions, **options)
 
