@@ -10,7 +10,7 @@ preset="${1:-test}"
 shift || true
 
 # Processor minutes of the preset `test` from an empty build folder without a compiler cache, rounded up.
-cpu_minutes=58
+cpu_minutes=30
 minutes=$(((cpu_minutes + jobs - 1) / jobs))
 if [[ $preset != test ]]; then
     say "builds and tests the preset $preset"
