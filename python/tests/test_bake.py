@@ -159,6 +159,14 @@ def test_a_mean_does_not_depend_on_the_order_of_triangles(scene):
     assert a.tobytes() == b.tobytes()
 
 
+def test_a_grid_that_cannot_be_held_is_refused_at_once():
+    vertices, triangles = box((0, 0, 0), (1, 1, 1))
+    grid = vp.Grid((0, 0, 0), (2.0**-20,) * 3, (2**20,) * 3)
+    for values in ({"a": np.zeros(len(triangles))}, "occupancy"):
+        with pytest.raises(MemoryError, match="Unable to allocate"):
+            vp.bake((vertices, triangles), grid, values, **({"per": {"a": "triangle"}} if isinstance(values, dict) else {}))
+
+
 def test_fill_is_a_value_of_the_type(scene):
     vertices, triangles = box((0, 0, 0), (1, 1, 1))
     grid = vp.fit((vertices, triangles), 6)

@@ -284,6 +284,7 @@ def bake(
     check_call("bake", grid, coverage, threads, status)
     if _is_own(values):
         _check_own(blend, per, fill)
+        _expect_room(grid)
         voxels, own, counts = _own(mesh, grid, values, coverage, threads)  # type: ignore[arg-type]
         take_counts(counts, status)
         to_caller = _to_caller(mesh)
@@ -300,11 +301,18 @@ def bake(
         return on_device
     if not attributes:
         return {}
+    fills = [_fill_of(a, fill) for a in attributes]
+    _expect_room(grid)
     voxels, rows, report = _drawn(m, grid, attributes, coverage, threads)
     take_counts(report, status)
     return {
-        a.name: m.to_caller(scattered(voxels, row, grid, _fill_of(a, fill), threads)) for a, row in zip(attributes, rows)
+        a.name: m.to_caller(scattered(voxels, row, grid, of_type, threads)) for a, row, of_type in zip(attributes, rows, fills)
     }
+
+
+def _expect_room(grid: Grid) -> None:
+    """Raises MemoryError, which names the size, for a grid that cannot be held, before anything is drawn."""
+    np.empty(grid.shape, np.uint8)
 
 
 def _fill_of(a: _Attribute, fill: Any) -> Any:
