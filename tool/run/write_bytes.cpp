@@ -4,8 +4,10 @@
 
 #include "model/parallel.hpp"
 #include "write/formats/output_file.hpp"
+#include "write/formats/voxel_mesh.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <initializer_list>
 #include <string>
 #include <string_view>
@@ -36,7 +38,9 @@ value_bytes bytes_of_values(std::span<const target> targets) {
 // Two sides of each voxel of a surface: lists of faces, then quads and vertices.
 double bytes_of_mesh(const expected_result& result, double voxels, double threads) {
     constexpr double of_voxel = 190, of_corner = 4;
-    return of_voxel * voxels + threads * of_corner * result.extent.x * result.extent.y;
+    const double places = std::min(1.0 * result.extent.x * result.extent.y,
+                                   static_cast<double>(most_places(static_cast<std::size_t>(2 * voxels))));
+    return of_voxel * voxels + threads * of_corner * places;
 }
 
 // A list of the bricks by their rows, first numbers of the parts, and what threads make of parts that wait to be

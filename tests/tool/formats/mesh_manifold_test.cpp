@@ -204,6 +204,25 @@ TEST_F(MeshManifold, VoxelsThatTouchInAnEdgeOrACornerComeApart) {
     }
 }
 
+// In planes of more places than any table has, corners are looked up in one of those that there are.
+TEST_F(MeshManifold, WidePlanesHaveTheSameMesh) {
+    volume v = random_volume({9, 8, 7}, 0.5, 5);
+    channel& color = v.add("color", scalar::u8, 4);
+    for (std::size_t n = 0; n < color.data.size(); ++n) color.data[n] = static_cast<std::byte>(n / 16 % 3);
+    const std::vector<voxel_face> faces = voxel_faces(voxel_shape(v, 1), false, 1, {});
+    const std::array<std::int64_t, 3> wide{1 << 20, 1 << 20, 7};
+    ASSERT_GT(std::uint64_t{1} << 40, most_places(faces.size()));
+    for (const bool splits : {false, true}) {
+        const welded_mesh narrow = weld(faces, v.extent, 2, splits), far = weld(faces, wide, 2, splits);
+        EXPECT_TRUE(narrow.quads == far.quads);
+        ASSERT_EQ(narrow.vertices.size(), far.vertices.size());
+        for (std::size_t n = 0; n < far.vertices.size(); ++n) {
+            EXPECT_EQ(narrow.vertices[n].corner, far.vertices[n].corner);
+            EXPECT_EQ(narrow.vertices[n].rgb_and_sheet, far.vertices[n].rgb_and_sheet);
+        }
+    }
+}
+
 // Colours split vertices, and nothing else: without them it is the mesh that was.
 TEST_F(MeshManifold, ColoursSplitVerticesOnlyWhereFacesDiffer) {
     volume v = random_volume({9, 8, 7}, 0.5, 3);

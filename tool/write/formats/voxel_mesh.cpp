@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
+#include <unordered_map>
 
 namespace voxelize {
 namespace {
@@ -227,26 +228,31 @@ private:
     std::array<std::vector<voxel_face>, 16> planes_;             // two directions each
 };
 
-// Numbers the corners of one plane of constant z: for each corner the list of its sheets and colours.
+// Numbers the corners of one plane of constant z: for each corner the list of its sheets and colours. Corners are
+// looked up in a table of the plane; in one of those that there are, where the plane has many more places than the mesh
+// has faces.
 class plane_welder {
 public:
-    plane_welder(std::int64_t nx, std::int64_t ny)
-        : width_(static_cast<std::size_t>(nx) + 1), first_(width_ * (static_cast<std::size_t>(ny) + 1), none) {}
+    plane_welder(std::int64_t nx, std::int64_t ny, std::size_t faces) : width_(static_cast<std::size_t>(nx) + 1) {
+        const std::size_t places = width_ * (static_cast<std::size_t>(ny) + 1);
+        if (places <= most_places(faces)) table_.resize(places, none);
+    }
 
     std::uint32_t number_of(const std::array<std::uint32_t, 3>& corner, std::uint32_t rgb_and_sheet) {
-        const std::size_t corner_index = static_cast<std::size_t>(corner[1]) * width_ + corner[0];
-        for (std::uint32_t n = first_[corner_index]; n != none; n = next_[n])
+        std::uint32_t& first = first_of(corner);
+        for (std::uint32_t n = first; n != none; n = next_[n])
             if (vertices[n].rgb_and_sheet == rgb_and_sheet) return n;
         const auto number = static_cast<std::uint32_t>(vertices.size());
         vertices.push_back({corner, rgb_and_sheet});
-        next_.push_back(first_[corner_index]);
-        first_[corner_index] = number;
+        next_.push_back(first);
+        first = number;
         return number;
     }
     // Ready for another plane; the vertices of this one are given away.
     std::vector<welded_mesh::vertex> take() {
-        for (const welded_mesh::vertex& v : vertices)
-            first_[static_cast<std::size_t>(v.corner[1]) * width_ + v.corner[0]] = none;
+        if (!table_.empty())
+            for (const welded_mesh::vertex& v : vertices) table_[place_of(v.corner)] = none;
+        found_.clear();
         next_.clear();
         return std::exchange(vertices, {});
     }
@@ -255,8 +261,19 @@ public:
 
 private:
     static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+    [[nodiscard]] std::size_t place_of(const std::array<std::uint32_t, 3>& corner) const {
+        return static_cast<std::size_t>(corner[1]) * width_ + corner[0];
+    }
+    // The last vertex of a corner, from which next_ leads to the others.
+    std::uint32_t& first_of(const std::array<std::uint32_t, 3>& corner) {
+        const std::size_t place = place_of(corner);
+        return table_.empty() ? found_.try_emplace(place, none).first->second : table_[place];
+    }
+
     std::size_t width_;
-    std::vector<std::uint32_t> first_; // vertex of a corner, then along next_
+    std::vector<std::uint32_t> table_;
+    std::unordered_map<std::size_t, std::uint32_t> found_; // in place of the table
     std::vector<std::uint32_t> next_;
 };
 
@@ -331,7 +348,7 @@ welded_mesh weld(std::span<const voxel_face> faces, const std::array<std::int64_
     // A few runs of planes for each thread: the table of corners is made once a run.
     const std::size_t runs = std::min(planes, static_cast<std::size_t>(4 * workers));
     parallel_for(runs, workers, [&](std::size_t run) {
-        plane_welder welder(extent[0], extent[1]);
+        plane_welder welder(extent[0], extent[1], faces.size());
         for (std::size_t z = planes * run / runs; z < planes * (run + 1) / runs; ++z) {
             for (std::size_t n = begin[z]; n < begin[z + 1]; ++n) {
                 const std::uint32_t id = by_plane[n];

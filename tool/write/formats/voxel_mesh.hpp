@@ -7,7 +7,9 @@
 
 #include "voxel_shape.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -53,6 +55,9 @@ struct welded_mesh {
     std::vector<std::array<std::uint32_t, 4>> quads; // vertex numbers, counter-clockwise seen from outside; in the
                                                      // order of the faces
 };
+
+// Places of a plane of corners up to which weld() has a table of them for each thread.
+[[nodiscard]] constexpr std::size_t most_places(std::size_t faces) { return std::max(std::size_t{1} << 20, 4 * faces); }
 
 // At most 2^30 faces, so that vertex numbers fit into 32 bits. `extent` is the volume's. Without `splits_colors` faces
 // of several colours share their vertices, which then have no colour.
