@@ -226,11 +226,11 @@ TEST(StreamedDistances, AreThoseOfTheModelThatIsHeld) {
     if (sanitized) return;
     const scratch_folder folder;
     write_ball(folder / "m.ply", 0);
-    two_ways{folder, folder / "m.ply", {"-r", "60", "--padding", "4", "--distance"}}.expect_equal(60, {});
+    two_ways{folder, folder / "m.ply", {"-r", "60", "--padding", "4", "--distance"}}.expect_equal(75, {});
     two_ways{folder,
              folder / "m.ply",
              {"-r", "40", "--distance", "--unsigned", "--band", "1.5", "-t", "nearest,color,normal,depth"}}
-        .expect_equal(60, {});
+        .expect_equal(75, {});
     write_ball(folder / "m.ply", 16);
     // The model leaves the grid: slabs without triangles, and rows that only triangles beside the grid cross.
     two_ways{
@@ -239,8 +239,8 @@ TEST(StreamedDistances, AreThoseOfTheModelThatIsHeld) {
         {"--voxel-size", "0.02", "--origin", "0.3,0.1,-0.4", "--extent", "30,50,70", "--distance", "--close-holes"}}
         .expect_equal(75, {});
     const two_ways open{folder, folder / "m.ply", {"-r", "40", "--distance", "--solid", "positive"}};
-    open.expect_equal(60, {});
-    EXPECT_NE(std::string::npos, open.draw_streamed(60).err.find("the sign of --distance: the model is not closed"));
+    open.expect_equal(75, {});
+    EXPECT_NE(std::string::npos, open.draw_streamed(75).err.find("the sign of --distance: the model is not closed"));
 }
 
 // A level set has the field in memory, and what is not decided slab by slab needs the model there.
@@ -249,7 +249,7 @@ TEST(StreamedDistances, WholeFieldsInMemoryAndWhatNeedsTheModel) {
     const scratch_folder folder;
     write_ball(folder / "m.ply", 0);
     const two_ways values{folder, folder / "m.ply", {"-r", "60", "--padding", "4", "--distance"}};
-    const outcome tight = values.draw("tight.nvdb", {"--max-memory", "60"}), free = values.draw("free.nvdb");
+    const outcome tight = values.draw("tight.nvdb", {"--max-memory", "75"}), free = values.draw("free.nvdb");
     ASSERT_EQ(0, tight.code) << tight.err;
     ASSERT_EQ(0, free.code) << free.err;
     EXPECT_NE(std::string::npos, tight.err.find(" triangles do not fit")) << tight.err;
