@@ -204,7 +204,7 @@ TEST_F(MeshManifold, VoxelsThatTouchInAnEdgeOrACornerComeApart) {
     }
 }
 
-// In planes of more places than any table has, corners are looked up in one of those that there are.
+// A plane with more places than most_places() has a hash map of its corners: the mesh is the same.
 TEST_F(MeshManifold, WidePlanesHaveTheSameMesh) {
     volume v = random_volume({9, 8, 7}, 0.5, 5);
     channel& color = v.add("color", scalar::u8, 4);

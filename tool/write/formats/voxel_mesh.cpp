@@ -228,9 +228,9 @@ private:
     std::array<std::vector<voxel_face>, 16> planes_;             // two directions each
 };
 
-// Numbers the corners of one plane of constant z: for each corner the list of its sheets and colours. Corners are
-// looked up in a table of the plane; in one of those that there are, where the plane has many more places than the mesh
-// has faces.
+// Numbers the corners of one plane of constant z: for each corner the list of its sheets and colours. Corners are found
+// in a table with an entry for each place of the plane. Of a plane that is too large for that (most_places), a hash map
+// holds the corners that the mesh has.
 class plane_welder {
 public:
     plane_welder(std::int64_t nx, std::int64_t ny, std::size_t faces) : width_(static_cast<std::size_t>(nx) + 1) {
