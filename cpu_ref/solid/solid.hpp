@@ -6,6 +6,7 @@
 // beam by beam, into targets or lists. The multiset of crossings fixes the result, so it is the same for any number of
 // threads and any order of the triangles.
 
+#include <cpu_ref/solid/solid_exterior.hpp>
 #include <cpu_ref/solid/solid_lists.hpp>
 #include <cpu_ref/solid/solid_repair.hpp>
 #include <cpu_ref/solid/solid_vote.hpp>
@@ -79,7 +80,8 @@ template <class Crossing, class Finish>
         options.repair == repair::exterior || options.repair == repair::vote || options.repair == repair::winding;
     const bool is_decided = options.repair == repair::exterior && options.slab != nullptr;
     const bool is_winding = options.repair == repair::winding;
-    if ((is_set && !is_winding) || options.extent != solid_extent::centre) {
+    const bool votes_alone = options.repair == repair::vote && !options.with_cover;
+    if ((is_set && !is_winding && !votes_alone) || options.extent != solid_extent::centre) {
         cover_list cover = is_decided   ? count_triangles(s)
                            : is_winding ? find_cover(how, keep_parts(s, false))
                                         : find_cover(how, s);
@@ -101,7 +103,7 @@ template <class Crossing, class Finish>
         } else if (is_decided) {
             words = take_interior(how, s, *options.slab);
         } else {
-            words = find_interior(how, s, options.closing, std::move(words));
+            words = find_interior(how, s, options, std::move(words));
         }
     }
     solid_sweep<Crossing> sweep(s.where.extent, options, needs_winding, std::move(crossings), std::move(words));

@@ -3,7 +3,8 @@
 #pragma once
 
 // Meshes with holes: repair::close_holes adds cones to the geometry, repair::exterior decides each body's voxels on a
-// dense grid of bits, as repair::vote does (solid_vote.hpp). All three give sets that no order of work can change.
+// dense grid of bits (solid_exterior.hpp), as repair::vote does (solid_vote.hpp). All three give sets that no order of
+// work can change.
 
 #include <cpu_ref/solid/solid_cover.hpp>
 #include <voxelpipe/solid/core/bit_grid.hpp>
@@ -100,6 +101,28 @@ void for_each_word(const std::vector<beam_words>& cover, const row_numbers& rows
             }
 }
 
+// Calls visit(u, v, first voxel behind) for the crossings of one body's triangles with the moved rows along an axis, of
+// triangles that reach layer `lowest` of the axis or above, but for crossings below it.
+template <int Axis, class Visit>
+void for_each_crossing_of(const solid_geometry& s, std::uint32_t draw, std::int64_t lowest, const Visit& visit) {
+    const core::voxel_box whole = s.whole_box();
+    for (std::size_t part = 0; part < s.parts.size(); ++part) {
+        if (s.body[part] != draw) continue;
+        const geometry::part& in = s.parts[part];
+        for (std::uint32_t i = 0; i < in.num_triangles; ++i) {
+            const glm::uvec3 t = in.triangles[i];
+            const core::snapped_position &a = in.positions[t.x], &b = in.positions[t.y], &c = in.positions[t.z];
+            if (!core::is_drawable(a) || !core::is_drawable(b) || !core::is_drawable(c)) continue;
+            if (core::bounds(a, b, c, s.snap.fraction).hi[Axis] < lowest) continue;
+            const core::row_box box = core::rows_within<Axis>(a, b, c, s.snap.fraction, whole);
+            core::for_each_crossing<Axis, core::centre_offset<>>(
+                a, b, c, s.snap.fraction, box, [&](std::int64_t u, std::int64_t v, std::int64_t first, int) {
+                    if (first >= lowest) visit(u, v, first);
+                });
+        }
+    }
+}
+
 [[nodiscard]] inline std::vector<beam_words> all_beams(const row_numbers& rows) {
     std::vector<beam_words> beams(rows.num_beams());
     for (std::size_t b = 0; b < beams.size(); ++b) beams[b].beam = b;
@@ -112,8 +135,6 @@ inline void end_beams(const execution& how, std::vector<beam_words>& beams) {
     beams.erase(std::remove_if(beams.begin(), beams.end(), [](const beam_words& b) { return b.words.empty(); }),
                 beams.end());
 }
-
-// ---- exterior -------------------------------------------------------------------------------------------------------
 
 // What solid_options::slab gives, in the numbers of the geometry's grid, in which the slab begins at its lead.
 class slab_bits {
@@ -142,60 +163,5 @@ private:
     int rows_;
     std::size_t words_;
 };
-
-// Each body's complement of what a flood from outside the grid reaches, through voxels further than `closing` from its
-// cover in the max norm; grown back by as much.
-[[nodiscard]] inline std::vector<beam_words> find_interior(const execution& how, const solid_geometry& s, int closing,
-                                                           std::vector<beam_words>&& cover) {
-    const stopwatch watch(how.times, &stage_times::fine_raster);
-    const row_numbers rows(s.where.extent);
-    std::vector<beam_words> beams;
-    const int ring = closing + 1;
-    for (std::uint32_t draw = 0; draw <= s.body.back(); ++draw) {
-        bit_grid grid(s.where.extent + 2 * ring);
-        for_each_word(cover, rows, draw, [&](int x, int y, int z, std::uint32_t bits) {
-            grid.set_bits(x + ring, y + ring, z + ring, bits);
-        });
-        core::dilate(grid, closing, how.threads);
-        grid = core::flood(grid);
-        core::dilate(grid, closing, how.threads);
-        if (draw == 0) beams = all_beams(rows); // behind the grid, which is what there may be no memory for
-        add_bits(how, rows, s.whole_box(), draw, beams,
-                 [&](int x, int y, int z) { return ~grid.get_bits(x + ring, y + ring, z + ring); });
-    }
-    end_beams(how, beams);
-    return beams;
-}
-
-// The interior of a slab, all of whose voxels a flood of the whole grid has decided.
-[[nodiscard]] inline std::vector<beam_words> take_interior(const execution& how, const solid_geometry& s,
-                                                           const solid_slab& slab) {
-    const stopwatch watch(how.times, &stage_times::fine_raster);
-    const row_numbers rows(s.where.extent);
-    std::vector<beam_words> beams = all_beams(rows);
-    add_bits(how, rows, s.whole_box(), 0, beams, slab_bits(slab.inside, s));
-    end_beams(how, beams);
-    return beams;
-}
-
-// The code and the counts that a cover has, of its triangles.
-[[nodiscard]] inline cover_list count_triangles(const solid_geometry& s) {
-    cover_list none;
-    const core::voxel_box whole = s.whole_box();
-    for (const geometry::part& p : s.parts)
-        for (std::uint32_t i = 0; i < p.num_triangles; ++i) {
-            const glm::uvec3 t = p.triangles[i];
-            if (t.x >= p.num_vertices || t.y >= p.num_vertices || t.z >= p.num_vertices) {
-                none.code = status_code::index_out_of_range;
-                return none;
-            }
-            core::voxel_box reach{};
-            core::count_class(none.counts,
-                              core::classify<coverage::conservative>(p.positions[t.x], p.positions[t.y],
-                                                                     p.positions[t.z], s.snap.fraction, whole, reach));
-        }
-    none.counts.triangles_in = s.triangles_in;
-    return none;
-}
 
 } // namespace voxelpipe::cpu

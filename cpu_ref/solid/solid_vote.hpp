@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -22,34 +23,21 @@ class parity_grid {
 public:
     parity_grid(const solid_geometry& s, std::uint32_t draw, const solid_slab* slab)
         : inside_(s.where.extent), open_(face(s.where.extent)) {
-        const core::voxel_box whole = s.whole_box();
         const glm::ivec3 e = s.where.extent;
         const bool is_slab = Axis == 2 && slab != nullptr;
-        for (std::size_t part = 0; part < s.parts.size(); ++part) {
-            if (s.body[part] != draw) continue;
-            const geometry::part& in = s.parts[part];
-            for (std::uint32_t i = 0; i < in.num_triangles; ++i) {
-                const glm::uvec3 t = in.triangles[i];
-                const core::snapped_position &a = in.positions[t.x], &b = in.positions[t.y], &c = in.positions[t.z];
-                if (!core::is_drawable(a) || !core::is_drawable(b) || !core::is_drawable(c)) continue;
-                // Crossings below the slab are in its parities.
-                if (is_slab && core::bounds(a, b, c, s.snap.fraction).hi[2] < s.lead.z) continue;
-                const core::row_box box = core::rows_within<Axis>(a, b, c, s.snap.fraction, whole);
-                core::for_each_crossing<Axis, core::centre_offset<>>(
-                    a, b, c, s.snap.fraction, box, [&](std::int64_t u, std::int64_t v, std::int64_t first, int) {
-                        if (is_slab && first < s.lead.z) return;
-                        const auto w = static_cast<int>(std::clamp<std::int64_t>(first, 0, e[Axis]));
-                        const auto p = core::to_xyz(Axis, static_cast<int>(u), static_cast<int>(v), w);
-                        if (w < e[Axis]) inside_.flip(p[0], p[1], p[2]);
-                        if (is_slab) return;
-                        // The row as a point of a face: along x its y and z, else its x and the other.
-                        if constexpr (Axis == 0)
-                            open_.flip(p[1], p[2], 0);
-                        else
-                            open_.flip(p[0], Axis == 1 ? p[2] : p[1], 0);
-                    });
-            }
-        }
+        // Crossings below the slab are in its parities.
+        const std::int64_t lowest = is_slab ? s.lead.z : std::numeric_limits<std::int64_t>::min();
+        for_each_crossing_of<Axis>(s, draw, lowest, [&](std::int64_t u, std::int64_t v, std::int64_t first) {
+            const auto w = static_cast<int>(std::clamp<std::int64_t>(first, 0, e[Axis]));
+            const auto p = core::to_xyz(Axis, static_cast<int>(u), static_cast<int>(v), w);
+            if (w < e[Axis]) inside_.flip(p[0], p[1], p[2]);
+            if (is_slab) return;
+            // The row as a point of a face: along x its y and z, else its x and the other.
+            if constexpr (Axis == 0)
+                open_.flip(p[1], p[2], 0);
+            else
+                open_.flip(p[0], Axis == 1 ? p[2] : p[1], 0);
+        });
         if (is_slab) begin_with(s, *slab);
         accumulate();
     }
@@ -105,7 +93,7 @@ private:
     bit_grid open_; // a bit a row, in one slice
 };
 
-// Each body's voxels that more of the closed rows along x, y and z call inside than outside, and its cover.
+// Each body's voxels that more of the closed rows along x, y and z call inside than outside, and its cover, if any.
 [[nodiscard]] inline std::vector<beam_words> find_majority(const execution& how, const solid_geometry& s,
                                                            const solid_slab* slab, std::vector<beam_words>&& cover) {
     const stopwatch watch(how.times, &stage_times::fine_raster);

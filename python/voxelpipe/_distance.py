@@ -75,8 +75,8 @@ def distance(
             every sample holds its own, and a mesh without triangles gives infinity.
         sign: what is inside and negative, as `fill` of solid(): "nonzero", "even_odd" or "positive"; "unsigned": nothing is.
         repair, closing, bodies, max_hole_edges: as in solid(), for the sign; not with "unsigned". Distances are those of the
-            mesh as it is. With "vote" and "exterior" samples of voxels that the surface touches are negative, as these are
-            part of such solids.
+            mesh as it is. With "vote" and "exterior" a sample has the side on which it lies, also in a voxel that the surface
+            touches, which is part of such solids.
         corners: samples at the corners of the voxels, one more along each axis, in place of their centres: sample [k, j, i]
             lies at origin + (i, j, k) * voxel_size.
         nearest: also returns the number of the nearest triangle, int64, of those with the same distance the first; of a list

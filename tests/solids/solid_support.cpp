@@ -144,6 +144,17 @@ mesh split_at_lattice_points(const mesh& m) {
     return out;
 }
 
+mesh without_triangles(mesh m, std::vector<std::size_t> which) {
+    std::sort(which.rbegin(), which.rend());
+    for (const std::size_t i : which) m.triangles.erase(m.triangles.begin() + static_cast<std::ptrdiff_t>(i));
+    return m;
+}
+mesh with_holes(splitmix64& random, mesh m, std::size_t count) {
+    for (std::size_t i = 0; i < count && m.triangles.size() > 1; ++i)
+        m = without_triangles(m, {static_cast<std::size_t>(random.below(m.triangles.size()))});
+    return m;
+}
+
 vp::grid unit_grid(glm::ivec3 extent) {
     vp::grid g;
     g.extent = extent;

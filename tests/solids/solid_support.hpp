@@ -45,6 +45,9 @@ mesh random_bodies(splitmix64& random, int extent, int count);
 // Each triangle into three at a point of its own plane: the sum of its vertices if that is thrice a lattice point, or
 // into two at the middle of an edge.
 mesh split_at_lattice_points(const mesh& m);
+// The mesh without the triangles of these numbers, and without `count` that are drawn by lot; one is left.
+mesh without_triangles(mesh m, std::vector<std::size_t> which);
+mesh with_holes(splitmix64& random, mesh m, std::size_t count);
 
 vp::grid unit_grid(glm::ivec3 extent);
 inline std::size_t index(glm::ivec3 extent, int x, int y, int z) {

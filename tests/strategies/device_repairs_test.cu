@@ -102,6 +102,7 @@ TEST(DeviceRepairs, HolesAndVotes) {
                     .expect_same();
             }
             case_of_slabs{there, g, {.repair = vp::repair::vote}, 3}.expect_same();
+            case_of_slabs{there, g, {.repair = vp::repair::vote, .with_cover = false}, 3}.expect_same();
             case_of_slabs{there, g, {.rule = vp::fill_rule::even_odd, .repair = vp::repair::close_holes}}.expect_same();
         }
 }

@@ -246,6 +246,24 @@ TEST(Solids, ExteriorAndVote) {
     one.expect_same(box_grid({130, 41, 43}), {.repair = vp::repair::exterior, .closing = 35});
 }
 
+// The sides of centres, also where rows end with a word and where bodies reach over the faces of the grid.
+TEST(Solids, ExteriorAndVoteWithoutTheirCover) {
+    const drawing_of_everything all{broken_meshes(), {{0.0f}, {0.25f}}, {{1, 0.1f}, {2, 3.0f}, {3, -1.0f}}};
+    const drawing_of_bits bits{broken_meshes(), {{}}, {{true}}};
+    for (const auto of : all_bodies) {
+        vp::solid_options options{.bodies = of, .repair = vp::repair::exterior, .with_cover = false};
+        for (const glm::ivec3& extent : {glm::ivec3(37, 26, 25), glm::ivec3(64, 9, 8), glm::ivec3(33, 26, 25)}) {
+            bits.expect_same(box_grid(extent), options);
+            options.closing = (options.closing + 1) % 3;
+        }
+        all.expect_same(box_grid({37, 26, 25}), options, loading::load);
+        options = {.bodies = of, .repair = vp::repair::vote, .with_cover = false};
+        bits.expect_same(box_grid({37, 26, 25}), options);
+        bits.expect_same(box_grid({64, 26, 25}).crop({3, 5, 2}, {40, 17, 20}), options);
+        expect_same_lists<std::uint32_t>(broken_meshes(), id_of_fragment{5}, box_grid({37, 26, 25}), options);
+    }
+}
+
 // Rows without crossings, bricks over the faces of the grid, bodies with and without cones.
 TEST(Solids, GeneralizedWindingNumbers) {
     const drawing_of_everything all{broken_meshes(), {{0.0f}, {0.25f}}, {{1, 0.1f}, {2, 3.0f}, {3, -1.0f}}};

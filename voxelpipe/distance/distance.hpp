@@ -145,6 +145,7 @@ struct distance_at_tag {};
     s.closing = o.closing;
     s.max_hole_edges = o.max_hole_edges;
     s.cones = o.cones;
+    s.with_cover = !may_have_cover(o.repair);
     s.count_voxels = false;
     return s;
 }

@@ -39,8 +39,8 @@ enum class solid_extent : std::uint8_t {
 enum class repair : std::uint8_t {
     none,        // a hole casts its shadow along +x; solid_counters::open_rows tells
     close_holes, // a cone is put over each hole's boundary, before anything else
-    // The next two have an inside of their own, and what a triangle touches belongs to it: a rule or an extent that is
-    // not solid_options' default is refused with status_code::bad_solid_options.
+    // The next two have an inside of their own, and what a triangle touches belongs to it (solid_options::with_cover):
+    // a rule or an extent that is not solid_options' default is refused with status_code::bad_solid_options.
     // diagnose_repair (diagnose_repair.hpp) tells whether a flood took part of the inside.
     exterior, // what a flood from outside the grid does not reach through untouched voxels: fills cavities; no crops
     vote,     // what most of the closed rows along x, y and z call inside by even_odd; a tie is outside
@@ -83,6 +83,12 @@ struct solid_options {
     // exterior or vote of a slab of a mesh in slabs, with bodies::call (slabs/stream.hpp puts it together). Null: of
     // the grid by itself.
     const solid_slab* slab = nullptr;
+    // exterior, vote: voxels that a triangle touches are inside, whatever their centres are. False: a vote decides at
+    // each centre; of a flood's cover those voxels are outside whose centre sees an outside one: no triangle crosses
+    // the segment to the centre of a face neighbour that no triangle touches and the flood reaches. The sign of
+    // distances and of surfaces has it so (DISTANCE in docs/design.md). False with another repair, or with exterior of
+    // a slab, is refused with bad_solid_options.
+    bool with_cover = true;
 };
 
 // even_odd, each draw by itself: overlapping draws stay solid, cavities within one draw stay empty.
@@ -139,6 +145,8 @@ template <class Mesh, class VertexShader, class SolidShader, class Payload>
 
 // True if a repair puts cones over the boundaries of holes.
 [[nodiscard]] constexpr bool has_cones(repair kind) { return kind == repair::close_holes || kind == repair::winding; }
+// True if a repair has an inside of its own, to which the cover belongs but for solid_options::with_cover.
+[[nodiscard]] constexpr bool may_have_cover(repair kind) { return kind == repair::exterior || kind == repair::vote; }
 
 // Names the calls of this module: a backend implements voxelize_solid as run_module(solid_tag, backend, draws, grid,
 // framebuffer_view or A-buffer, options, number of triangles), which argument-dependent lookup finds by the tag.
@@ -159,13 +167,14 @@ inline constexpr bool takes_solid_slabs = requires {
     if (!known || o.closing < 0 || o.closing > solid_options::max_closing)
         return failure(status_code::bad_solid_options);
     constexpr solid_options plain;
-    if ((o.repair == repair::exterior || o.repair == repair::vote) &&
-        (o.rule != plain.rule || o.extent != plain.extent))
+    if (may_have_cover(o.repair) && (o.rule != plain.rule || o.extent != plain.extent))
         return failure(status_code::bad_solid_options);
     if (o.repair == repair::winding) {
         if (o.rule == fill_rule::even_odd) return failure(status_code::bad_solid_options);
         if (!are_measurable(g.voxel_size)) return failure(status_code::bad_voxel_size);
     }
+    if (!o.with_cover && (!may_have_cover(o.repair) || (o.repair == repair::exterior && o.slab != nullptr)))
+        return failure(status_code::bad_solid_options);
     if (o.slab != nullptr) {
         if (!takes_slabs) return failure(status_code::strategy_unavailable);
         const bool has_bits = o.repair == repair::exterior

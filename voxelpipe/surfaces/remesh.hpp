@@ -54,6 +54,7 @@ namespace core {
     s.repair = o.repair;
     s.closing = o.closing;
     s.max_hole_edges = o.max_hole_edges;
+    s.with_cover = !may_have_cover(o.repair);
     s.count_voxels = false;
     return s;
 }

@@ -43,7 +43,10 @@ distance_bytes::distance_bytes(const voxelize_request& request) {
     if (shaded) vertex += sizeof(surface_varyings);
     triangle = triangle_bytes + (request.distance->is_signed ? crossing_bytes : 0);
     threads = thread_count(request.threads) * thread_bytes;
-    if (request.distance->is_signed) samples += all / 8;
+    if (!request.distance->is_signed) return;
+    samples += all / 8; // and grids of bits: of the rows of three axes, and of the cover and what a flood reaches
+    if (request.distance->sign.vote) samples += all * 3 / 8;
+    if (request.distance->sign.rule == solid_rule::exterior) samples += all * 5 / 8;
 }
 
 double written_bytes(const voxelize_request& request) {

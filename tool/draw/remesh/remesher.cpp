@@ -117,7 +117,9 @@ remesh_memory remesh_need(const scene& model, const voxelize_request& request) {
                  static_cast<double>(model.triangle_count()) * remesh_bytes::triangle +
                  crossings * remesh_bytes::crossing +
                  surface_cells_of(request, samples, crossings) * remesh_bytes::cell;
-    if (wanted.sign.vote || wanted.sign.rule == solid_rule::exterior) need.bytes += samples * 3 / 8;
+    // Grids of bits: of the rows of three axes, and of the cover and what a flood reaches.
+    if (wanted.sign.vote) need.bytes += samples * 3 / 8;
+    if (wanted.sign.rule == solid_rule::exterior) need.bytes += samples * 5 / 8;
     if (wanted.level != 0) {
         // The field of the grid with its bits, or the samples of the band in lists, then in bricks.
         constexpr double grid_bytes = 4.25, brick_bytes = 60;

@@ -12,12 +12,12 @@
 #include <voxelpipe/device/targets/clear_target.cuh>
 #include <voxelpipe/solid/device/emit_crossings.cuh>
 #include <voxelpipe/solid/device/exterior.cuh>
+#include <voxelpipe/solid/device/exterior_sides.cuh>
 #include <voxelpipe/solid/device/fill_bit_rows.cuh>
 #include <voxelpipe/solid/device/fill_rows.cuh>
 #include <voxelpipe/solid/device/parity_rows.cuh>
 #include <voxelpipe/solid/device/solid_cones.cuh>
 #include <voxelpipe/solid/device/solid_cover.cuh>
-#include <voxelpipe/solid/device/vote.cuh>
 #include <voxelpipe/solid/device/winding.cuh>
 
 #include <algorithm>
@@ -94,6 +94,7 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         cover_memory cover;
         exterior_memory exterior;
         vote_memory vote;
+        side_memory sides;
         winding_memory winding;
     };
     // Crossings toggle bits, are grouped by row, or go into one list that is sorted, and the cover with them.
@@ -121,6 +122,8 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         if (has_cover()) m.cover = cover_memory::take(a, most, plan.g, plan.limits);
         if (plan.options.repair == repair::exterior && plan.options.slab == nullptr)
             m.exterior = exterior_memory::take(a, plan.g.extent, plan.options.closing);
+        if (plan.options.repair == repair::exterior && !plan.options.with_cover)
+            m.sides = side_memory::take(a, plan.g.extent);
         if (plan.options.repair == repair::vote) m.vote = vote_memory::take(a, plan.g.extent);
         if (plan.options.repair == repair::winding) m.winding = winding_memory::take(a, rows(), num_bodies());
         return m;
@@ -254,26 +257,32 @@ private:
             emit_crossings(stored_triangles{geo, rows(), plan.num_primitives, num_drawn(geometry_of)}, rows(), sink,
                            m.kept.with(state), state, stream);
         }
+        const bool votes_alone = plan.options.repair == repair::vote && !plan.options.with_cover;
         for_each_body([&](std::uint32_t body, std::size_t first, std::size_t last) {
-            if (!is_winding || plan.options.extent != solid_extent::centre)
+            const std::uint32_t begin = geometry_of[first].first_primitive,
+                                end =
+                                    last < geometry_of.size() ? geometry_of[last].first_primitive : plan.num_primitives;
+            const stored_triangles all{geo, rows(), plan.num_primitives, plan.num_primitives};
+            if (votes_alone)
+                m.cover.clear(plan.g, stream);
+            else if (!is_winding || plan.options.extent != solid_extent::centre)
                 cover_body(m, geo, geometry_of, body, first, last, state, stream);
             if (is_winding) {
                 // Behind the draws are the cones, body by body.
                 const std::uint32_t first_cone = geometry_of[draws.size() + body].first_primitive;
-                const winding_triangles of_body{geometry_of[first].first_primitive, geometry_of[last].first_primitive,
-                                                first_cone, first_cone + cones[body].num_triangles};
+                const winding_triangles of_body{begin, end, first_cone, first_cone + cones[body].num_triangles};
                 add_windings(m.winding, cones[body].tree, geo, of_body, rows(), plan.options.rule, plan.options.extent,
                              body, m.cover.mask, state, stream);
             } else if (plan.options.repair == repair::exterior && plan.options.slab != nullptr) {
                 // The cover has counted the triangles; the inside is known.
                 copy_from_slab(m.cover.mask, plan.options.slab->inside, {plan.g.extent}, plan.g.extent.z, stream);
             } else if (plan.options.repair == repair::exterior) {
+                if (!plan.options.with_cover) m.sides.keep_cover(m.cover.mask, stream);
                 fill_to_exterior(m.exterior, m.cover.mask, stream);
+                if (!plan.options.with_cover)
+                    drop_seen(m.sides, all, begin, end - begin, rows(), m.cover.mask, state, stream);
             } else {
-                const std::uint32_t begin = geometry_of[first].first_primitive,
-                                    end = last < draws.size() ? geometry_of[last].first_primitive : plan.num_primitives;
-                add_votes(m.vote, stored_triangles{geo, rows(), plan.num_primitives, plan.num_primitives}, begin,
-                          end - begin, rows(), plan.options.slab, m.cover.mask, state, stream);
+                add_votes(m.vote, all, begin, end - begin, rows(), plan.options.slab, m.cover.mask, state, stream);
             }
             if (m.by_row.counts == nullptr) list_cover(m.cover, rows(), list, body, state, stream);
         });

@@ -60,22 +60,30 @@ struct voting_triangles {
     }
 };
 
-// Changes the bit of the first voxel behind each crossing along an axis, and that of its row. A block takes as many
-// triangles as it has threads, and divides their lines; `shares` blocks take the same triangles. Along x triangles and
-// crossings are counted. is_slab: the box is a slab along z, whose columns begin with the parity below it, and are
-// known to be open or not (solid_options::slab).
+// What crossings do to the bits of parity_masks.
+enum class row_use : std::uint8_t {
+    parities,      // change the bit of the first voxel behind them, and that of their row
+    slab_parities, // the same in a slab along z, whose columns begin with the parity below it, and are known to be open
+                   // or not (solid_options::slab)
+    segments,      // set the bit of the first voxel behind them if they lie between the centres of neighbours: `inside`
+                   // for the segment from the voxel below, `open` for the one from the last voxel out of the grid
+};
+
+// Goes through the crossings along an axis. A block takes as many triangles as it has threads, and divides their lines;
+// `shares` blocks take the same triangles. Along x triangles and crossings are counted, but for segments.
 template <int Axis, class State>
 __global__ __launch_bounds__(threads_per_block,
                              2) void toggle_along_kernel(const __grid_constant__ stored_triangles source,
                                                          std::uint32_t first_triangle, std::uint32_t num_triangles,
                                                          unsigned shares, const __grid_constant__ row_grid grid,
-                                                         const __grid_constant__ bit_box box, bool is_slab,
-                                                         word* inside, word* open, State* state) {
+                                                         const __grid_constant__ bit_box box, row_use use, word* inside,
+                                                         word* open, State* state) {
     using core::triangle_class;
     __shared__ voting_triangles all;
     const core::voxel_box whole = grid.whole_box();
     constexpr unsigned neighbours = 8; // triangles of a block that follow each other in the mesh
     const unsigned share = blockIdx.x % shares;
+    const bool is_slab = use == row_use::slab_parities;
     row_totals totals;
     // The number of the thread's triangle's lines; 0 where it has none to take.
     const auto lines_of = [&](std::uint32_t i) -> std::uint32_t {
@@ -120,20 +128,26 @@ __global__ __launch_bounds__(threads_per_block,
                     const int n = Axis == 0 ? box.extent.x : Axis == 1 ? box.extent.y : box.extent.z;
                     const auto w = static_cast<int>(behind < 0 ? 0 : behind < n ? behind : n);
                     const auto q = core::to_xyz(Axis, static_cast<int>(u), static_cast<int>(v), w);
-                    if (w < n) atomicXor(inside + box.first_word(q[1], q[2]) + q[0] / 32, 1u << q[0] % 32);
-                    if constexpr (Axis == 0) {
-                        const std::uint64_t row = grid.row(q[1], q[2]);
-                        atomicXor(open + row / 32, 1u << row % 32);
-                    } else if (Axis == 1 || !is_slab) {
-                        atomicXor(open + static_cast<std::uint64_t>(Axis == 1 ? q[2] : q[1]) * box.words_x() +
-                                      q[0] / 32,
-                                  1u << q[0] % 32);
+                    word* const voxel = inside + box.first_word(q[1], q[2]) + q[0] / 32;
+                    const std::uint64_t row = grid.row(q[1], q[2]);
+                    word* const of_row =
+                        Axis == 0
+                            ? open + row / 32
+                            : open + static_cast<std::uint64_t>(Axis == 1 ? q[2] : q[1]) * box.words_x() + q[0] / 32;
+                    const word voxel_bit = 1u << q[0] % 32, row_bit = Axis == 0 ? 1u << row % 32 : voxel_bit;
+                    if (use == row_use::segments) {
+                        if (behind < 0 || behind > n) return;
+                        atomicOr(w < n ? voxel : of_row, w < n ? voxel_bit : row_bit);
+                        return;
                     }
+                    if (w < n) atomicXor(voxel, voxel_bit);
+                    if (Axis != 2 || !is_slab) atomicXor(of_row, row_bit);
                 });
         }
         __syncthreads();
     }
-    if constexpr (Axis == 0) totals.add_up(true, state);
+    if constexpr (Axis == 0)
+        if (use != row_use::segments) totals.add_up(true, state);
 }
 
 // Each bit becomes the parity of those up to it: along x, a thread a row, or along y or z.
@@ -206,6 +220,25 @@ struct vote_memory {
     }
 };
 
+// Goes through the crossings of a body's triangles along all three axes.
+template <int = 0>
+void toggle_rows(const vote_memory& m, const stored_triangles& source, std::uint32_t first_triangle,
+                 std::uint32_t num_triangles, const row_grid& grid, row_use use, pipeline_state* state,
+                 cudaStream_t stream) {
+    constexpr unsigned per_multiprocessor = 4;
+    const unsigned batches = fill_device(num_triangles, per_multiprocessor),
+                   most = fill_device(~0u, per_multiprocessor), shares = most / batches > 1 ? most / batches : 1;
+    const auto toggle = [&]<int Axis>() {
+        toggle_along_kernel<Axis, pipeline_state><<<batches * shares, threads_per_block, 0, stream>>>(
+            source, first_triangle, num_triangles, shares, grid, m.box, use, m.masks.inside[Axis], m.masks.open[Axis],
+            state);
+        check(cudaGetLastError(), stage::coarse_raster);
+    };
+    toggle.template operator()<0>();
+    toggle.template operator()<1>();
+    toggle.template operator()<2>();
+}
+
 // Joins what the triangles of a body vote for to the mask of its cover. slab: null, or the bits of its columns.
 template <int = 0>
 void add_votes(const vote_memory& m, const stored_triangles& source, std::uint32_t first_triangle,
@@ -218,18 +251,8 @@ void add_votes(const vote_memory& m, const stored_triangles& source, std::uint32
         copy_from_slab(masks.inside[2], slab->below, box, 1, stream);
         copy_from_slab(masks.open[2], slab->open, box, 1, stream);
     }
-    constexpr unsigned per_multiprocessor = 4;
-    const unsigned batches = fill_device(num_triangles, per_multiprocessor),
-                   most = fill_device(~0u, per_multiprocessor), shares = most / batches > 1 ? most / batches : 1;
-    const auto toggle = [&]<int Axis>() {
-        toggle_along_kernel<Axis, pipeline_state><<<batches * shares, threads_per_block, 0, stream>>>(
-            source, first_triangle, num_triangles, shares, grid, box, slab != nullptr, masks.inside[Axis],
-            masks.open[Axis], state);
-        check(cudaGetLastError(), stage::coarse_raster);
-    };
-    toggle.template operator()<0>();
-    toggle.template operator()<1>();
-    toggle.template operator()<2>();
+    toggle_rows(m, source, first_triangle, num_triangles, grid,
+                slab != nullptr ? row_use::slab_parities : row_use::parities, state, stream);
     const unsigned for_words = fill_device(box.num_words(), 16);
     accumulate_rows_kernel<word><<<for_words, threads_per_block, 0, stream>>>(masks.inside[0], box);
     for (const int axis : {1, 2})
