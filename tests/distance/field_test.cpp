@@ -237,6 +237,51 @@ TEST(DistanceField, BoxesFollowTheirFormula) {
             }
 }
 
+// The facets of a torus lie within its sagitta: half the square of an edge over the least radius of curvature.
+TEST(DistanceField, ToriFollowTheirFormula) {
+    const double major = 8.5, minor = 3.25;
+    const glm::dvec3 centre(13.2, 12.6, 6.4);
+    const int around = 256, across = 96;
+    mesh m;
+    for (int i = 0; i < around; ++i)
+        for (int k = 0; k < across; ++k) {
+            constexpr double turn = 6.283185307179586;
+            const double u = turn * i / around, v = turn * k / across, r = major + minor * std::cos(v);
+            m.positions.push_back(
+                glm::vec3(centre + glm::dvec3(r * std::cos(u), r * std::sin(u), minor * std::sin(v))));
+            const auto at = [&](int a, int b) {
+                return static_cast<std::uint32_t>((i + a) % around * across + (k + b) % across);
+            };
+            m.triangles.push_back({at(0, 0), at(1, 0), at(1, 1)});
+            m.triangles.push_back({at(0, 0), at(1, 1), at(0, 1)});
+        }
+    double longest = 0.0;
+    for (const glm::uvec3& t : m.triangles)
+        for (int k = 0; k < 3; ++k) {
+            const glm::dvec3 e(m.positions[t[k]] - m.positions[t[(k + 1) % 3]]);
+            longest = std::max(longest, e.x * e.x + e.y * e.y + e.z * e.z);
+        }
+    const double sagitta = longest / (2 * minor);
+    ASSERT_LT(sagitta, 0.02);
+    for (const vp::sample where : {vp::sample::centre, vp::sample::corner}) {
+        const field f =
+            library_field(m, grid_of({27, 26, 13}, glm::dvec3(1.0)), {.band = vp::band::whole, .sample = where});
+        const double half = where == vp::sample::corner ? 0.0 : 0.5;
+        std::size_t inside = 0;
+        for (int z = 0; z < f.extent.z; ++z)
+            for (int y = 0; y < f.extent.y; ++y)
+                for (int x = 0; x < f.extent.x; ++x) {
+                    const glm::dvec3 p = glm::dvec3(x + half, y + half, z + half) - centre;
+                    const double ring = std::sqrt(p.x * p.x + p.y * p.y) - major;
+                    const double expected = std::sqrt(ring * ring + p.z * p.z) - minor;
+                    const double d = f.distances[f.index(x, y, z)];
+                    ASSERT_NEAR(d, expected, sagitta) << x << " " << y << " " << z;
+                    inside += d < 0.0 ? 1 : 0;
+                }
+        EXPECT_GT(inside, 1000u);
+    }
+}
+
 // The chords of a sphere lie between its radius and the distance of their planes from the centre.
 TEST(DistanceField, SpheresFollowTheirFormula) {
     const float radius = 9.0f;

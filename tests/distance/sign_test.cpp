@@ -36,7 +36,8 @@ TEST(DistanceSign, IsThatOfSkewRaysOnClosedMeshes) {
     }
 }
 
-// Every rule, both kinds of bodies and every repair: minus exactly where the solid has a voxel.
+// Every rule, both kinds of bodies and every repair, at centres and at corners: minus exactly where the solid of a grid
+// with these centres has a voxel.
 TEST(DistanceSign, IsTheSolidsUnderEveryRuleAndRepair) {
     splitmix64 random(12);
     const std::int64_t n = unit::cases(100) / 50;
@@ -53,16 +54,22 @@ TEST(DistanceSign, IsTheSolidsUnderEveryRuleAndRepair) {
         all.push_back({.repair = vp::repair::vote});
         for (const vp::bodies bodies : {vp::bodies::call, vp::bodies::draw})
             all.push_back({.bodies = bodies, .repair = vp::repair::winding});
-        all.push_back({.sample = vp::sample::centre, .rule = vp::fill_rule::positive, .repair = vp::repair::winding});
+        all.push_back({.rule = vp::fill_rule::positive, .repair = vp::repair::winding});
         for (const vp::distance_options& o : all) {
-            const field f = library_field(draws, g, o);
-            ASSERT_TRUE(f.status.ok()) << f.status.message();
             vp::solid_options same = vp::core::sign_options(o);
             same.count_voxels = true;
-            const solids::solid s = solids::library_solid(draws, g, same);
-            for (std::size_t v = 0; v < s.voxels.size(); ++v)
-                ASSERT_EQ(std::signbit(f.distances[v]), s.voxels[v] != 0 && f.distances[v] != 0.0f);
-            EXPECT_EQ(f.status.solid, s.status.solid);
+            for (const vp::sample where : {vp::sample::centre, vp::sample::corner}) {
+                vp::distance_options there = o;
+                there.sample = where;
+                const field f = library_field(draws, g, there);
+                ASSERT_TRUE(f.status.ok()) << f.status.message();
+                const vp::grid samples = where == vp::sample::corner ? g.at_corners() : g;
+                const solids::solid s = solids::library_solid(draws, samples, same);
+                ASSERT_EQ(f.distances.size(), s.voxels.size());
+                for (std::size_t v = 0; v < s.voxels.size(); ++v)
+                    ASSERT_EQ(std::signbit(f.distances[v]), s.voxels[v] != 0 && f.distances[v] != 0.0f);
+                EXPECT_EQ(f.status.solid, s.status.solid);
+            }
         }
     }
 }
@@ -75,6 +82,31 @@ TEST(DistanceSign, ThinAndCloseWallsKeepTheirSides) {
     const field f = library_field(m, solids::unit_grid({16, 16, 12}), {.band = vp::band::whole});
     for (int z = 0; z < 12; ++z)
         for (int x = 3; x < 13; ++x) EXPECT_EQ(f.distances[f.index(x, 7, z)] < 0.0f, z == 4) << z;
+}
+
+// A sample in front of a surface is not negative for the voxel that the surface touches, and a sheet has no inside.
+TEST(DistanceSign, FloodsAndVotesDecideAtTheSample) {
+    const vp::grid g = solids::unit_grid(glm::ivec3(24));
+    const mesh ball = solids::sphere({12, 12, 12}, 8.3f, 4);
+    const field truth = library_field(ball, g);
+    std::size_t touched = 0;
+    const solids::voxel_set cover = solids::library_cover(ball, g);
+    for (const vp::repair repair : {vp::repair::exterior, vp::repair::vote}) {
+        const field f = library_field(ball, g, {.repair = repair});
+        std::size_t other = 0;
+        for (std::size_t v = 0; v < cover.size(); ++v) {
+            if (f.distances[v] != truth.distances[v]) ++other;
+            touched += cover[v] != 0 && f.distances[v] > 0.0f ? 1 : 0;
+        }
+        // Those of a flood that touched neighbours surround stay inside.
+        EXPECT_LE(other, repair == vp::repair::vote ? 0u : solids::count(cover) / 20);
+    }
+    EXPECT_GT(touched, solids::count(cover) / 2) << "outside, in touched voxels";
+    mesh sheet;
+    sheet.positions = {{3, 3, 12.3f}, {21, 3, 12.3f}, {21, 21, 12.3f}, {3, 21, 12.3f}};
+    sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
+    for (const vp::repair repair : {vp::repair::exterior, vp::repair::vote})
+        for (const float d : library_field(sheet, g, {.repair = repair}).distances) ASSERT_FALSE(std::signbit(d));
 }
 
 TEST(DistanceSign, ZeroIsPositive) {
