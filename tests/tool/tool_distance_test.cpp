@@ -340,8 +340,9 @@ TEST(Distance, AFieldBeyondMemoryIsDrawnInSlabs) {
         unsigned layers, bytes; // a sample
         std::vector<std::string> more;
     };
-    for (const way& w : {way{"npy", 700, 4, {}}, way{"npz", 400, 12, {"--band", "1", "-t", "nearest"}},
-                         way{"zarr", 1100, 4, {"--close-holes"}}}) {
+    for (const way& w :
+         {way{"npy", 700, 4, {}}, way{"npz", 400, 12, {"--band", "1", "-t", "nearest"}},
+          way{"nvdb", 700, 12, {"--band", "2", "-t", "nearest"}}, way{"zarr", 1100, 4, {"--close-holes"}}}) {
         const auto draw = [&](const std::string& name, const std::vector<std::string>& limit) {
             std::vector<std::string> all{folder / "m.glb",
                                          "-o",

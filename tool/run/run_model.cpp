@@ -109,10 +109,13 @@ std::vector<std::filesystem::path> write_output(Volume& voxels, const command_li
 
 // Layers of whose multiple the outputs take a field of distances in slabs; 0: one of them needs it whole.
 int slab_layers_of(const command_line& options) {
+    constexpr int brick = 8; // what holds the band reads a layer of bricks at a time
     int layers = 1;
     for (const std::filesystem::path& output : options.outputs) {
         const std::string extension = lower_extension(zarr_target(output));
-        if (!is_streamed(extension) || shows_level(output)) return 0;
+        const bool holds_band = extension == ".nvdb" || extension == ".vdb";
+        if ((!is_streamed(extension) && !holds_band) || shows_level(output)) return 0;
+        if (holds_band) layers = std::max(layers, brick);
         if (extension == ".zarr") layers = static_cast<int>(zarr_slab_layers); // shards are written one by one
     }
     return layers;

@@ -27,33 +27,127 @@ float value_at(const channel& c, std::int64_t i) {
     return value;
 }
 
+// A brick of samples; of those of a field that is read piece by piece, where the values of its band begin among those
+// of its layer.
 struct found_brick {
     std::uint64_t key = 0;
     voxelpipe::brick_mask band, inside;
-    std::uint32_t samples = 0; // in the grid
+    std::size_t first_value = 0;
+};
+// The bricks of a layer of bricks, and of the samples in it the greatest finite distance and whether one within the
+// band or inside lies at the grid's sides.
+struct found_layer {
+    std::vector<found_brick> bricks;            // with a part of the band, or of a level set with both sides
+    std::vector<std::uint64_t> inner;           // of a level set: keys of those that lie inside
+    std::vector<std::vector<std::byte>> values; // by channel, of the band, in the order of the bricks and their voxels
+    float greatest = 0;
+    bool is_cut = false;
 };
 
-// The samples of a brick.
-found_brick look_at(const volume& v, const channel& c, float band, const glm::ivec3& brick) {
+// A field's shape, and what tells its samples apart.
+struct field_shape {
+    const volume& v;
+    float band;
+    bool is_level_set;
+};
+
+// Looks at a brick. distances: those of its layer of bricks.
+void look_at(const field_shape& f, const std::byte* distances, const glm::ivec3& brick, found_layer& to) {
+    const volume& v = f.v;
     found_brick found;
     found.key = voxelpipe::core::morton_key(brick.x, brick.y, brick.z);
     const auto end = [&](int axis) {
         const std::int64_t left = v.extent[static_cast<std::size_t>(axis)] - std::int64_t{8} * brick[axis];
         return static_cast<int>(std::min<std::int64_t>(8, left));
     };
+    const auto is_side = [&](const glm::ivec3& p) {
+        for (int a = 0; a < 3; ++a)
+            if (p[a] == 0 || p[a] + 1 == v.extent[static_cast<std::size_t>(a)]) return true;
+        return false;
+    };
     for (int z = 0; z < end(2); ++z)
         for (int y = 0; y < end(1); ++y)
             for (int x = 0; x < end(0); ++x) {
-                const float d = value_at(c, v.index(8 * brick.x + x, 8 * brick.y + y, 8 * brick.z + z));
+                const glm::ivec3 p = 8 * brick + glm::ivec3(x, y, z);
+                float d = 0;
+                std::memcpy(&d, distances + static_cast<std::size_t>(v.index(p.x, p.y, z)) * sizeof(d), sizeof(d));
                 const auto bit = static_cast<unsigned>(voxelpipe::core::morton_key(x, y, z));
                 const std::uint64_t one = std::uint64_t{1} << (bit % 64);
-                if (std::abs(d) < band)
+                if (std::abs(d) < f.band)
                     found.band.words[bit / 64] |= one;
                 else if (d < 0)
                     found.inside.words[bit / 64] |= one;
-                ++found.samples;
+                if (std::abs(d) < std::numeric_limits<float>::infinity())
+                    to.greatest = std::max(to.greatest, std::abs(d));
+                if (d < f.band && is_side(p)) to.is_cut = true;
             }
-    return found;
+    const std::uint32_t inside = found.inside.count();
+    if (found.band.count() != 0 || (f.is_level_set && inside != 0 && inside != 512))
+        to.bricks.push_back(found);
+    else if (f.is_level_set && inside == 512)
+        to.inner.push_back(found.key);
+}
+
+// Calls visit(place in the layer of bricks, number of the voxel) for the band's voxels of some bricks, in order.
+template <class Visit>
+void for_each_in_band(const volume& v, const found_brick& b, const Visit& visit) {
+    const glm::ivec3 origin = voxelpipe::core::morton_position(b.key) * 8;
+    std::size_t n = 0;
+    for (unsigned bit = 0; bit < 512; ++bit) {
+        if (!b.band.has(bit)) continue;
+        const glm::ivec3 p = voxelpipe::core::morton_position(bit);
+        visit(static_cast<std::size_t>(v.index(origin.x + p.x, origin.y + p.y, p.z)), b.first_value + n++);
+    }
+}
+
+std::size_t value_size(const channel& c) { return size_of(c.type) * static_cast<std::size_t>(c.components); }
+
+// Bytes of a layer of bricks before it, in a channel of the volume's own memory.
+std::size_t bytes_before(const volume& v, const channel& c, int brick_layer) {
+    return static_cast<std::size_t>(v.index(0, 0, 8 * static_cast<std::int64_t>(brick_layer))) * value_size(c);
+}
+
+// Reads a layer of bricks at a time, and keeps the values of the band.
+void read_layers(const field_shape& f, const channel& distances, int threads, const glm::ivec3& bricks,
+                 std::vector<found_layer>& layers) {
+    const volume& v = f.v;
+    std::vector<std::byte> read;
+    const auto read_layer = [&](const channel& c, int z) {
+        const std::int64_t end = std::min<std::int64_t>(v.extent[2], 8 * (static_cast<std::int64_t>(z) + 1));
+        const std::size_t first = bytes_before(v, c, z);
+        read.resize(static_cast<std::size_t>(v.index(0, 0, end)) * value_size(c) - first);
+        c.read(first / value_size(c), read);
+    };
+    for (int z = 0; z < bricks.z; ++z) {
+        found_layer& layer = layers[static_cast<std::size_t>(z)];
+        read_layer(distances, z);
+        std::vector<found_layer> rows(static_cast<std::size_t>(bricks.y));
+        parallel_for(rows.size(), threads, [&](std::size_t y) {
+            for (int x = 0; x < bricks.x; ++x) look_at(f, read.data(), {x, static_cast<int>(y), z}, rows[y]);
+        });
+        std::size_t kept = 0;
+        for (const found_layer& row : rows) {
+            layer.greatest = std::max(layer.greatest, row.greatest);
+            layer.is_cut = layer.is_cut || row.is_cut;
+            layer.inner.insert(layer.inner.end(), row.inner.begin(), row.inner.end());
+            for (found_brick b : row.bricks) {
+                b.first_value = kept;
+                kept += b.band.count();
+                layer.bricks.push_back(b);
+            }
+        }
+        const channel* held = &distances; // that has been read
+        for (const channel& c : v.channels) {
+            if (held != &c) read_layer(c, z);
+            held = &c;
+            const std::size_t size = value_size(c);
+            std::vector<std::byte>& to = layer.values.emplace_back(kept * size);
+            for (const found_brick& b : layer.bricks)
+                for_each_in_band(v, b, [&](std::size_t from, std::size_t at) {
+                    std::memcpy(to.data() + at * size, read.data() + from * size, size);
+                });
+        }
+    }
 }
 
 // Cubes of consecutive keys, as large as they can be.
@@ -71,15 +165,6 @@ std::vector<voxelpipe::brick_tile> tiles_of(const std::vector<std::uint64_t>& ke
     return tiles;
 }
 
-float greatest_of(const channel& c) {
-    float greatest = 0;
-    for (std::size_t i = 0; i < c.data.size() / sizeof(float); ++i) {
-        const float d = std::abs(value_at(c, static_cast<std::int64_t>(i)));
-        if (d < std::numeric_limits<float>::infinity()) greatest = std::max(greatest, d);
-    }
-    return greatest;
-}
-
 } // namespace
 
 band_bricks find_band(const volume& v, int threads) {
@@ -89,57 +174,73 @@ band_bricks find_band(const volume& v, int threads) {
     const bool is_whole = !std::isfinite(field.band);
     band_bricks result;
     result.is_level_set = !is_whole && field.is_signed && are_cubic(v.voxel_size);
-    result.background = is_whole ? greatest_of(distances) : field.band;
+    const field_shape shape{v, field.band, result.is_level_set};
 
     const glm::ivec3 bricks((v.extent[0] + 7) / 8, (v.extent[1] + 7) / 8, (v.extent[2] + 7) / 8);
-    std::vector<std::vector<found_brick>> layers(static_cast<std::size_t>(bricks.z));
-    std::vector<std::vector<std::uint64_t>> inner(layers.size());
-    parallel_for(layers.size(), threads, [&](std::size_t z) {
-        for (int y = 0; y < bricks.y; ++y)
-            for (int x = 0; x < bricks.x; ++x) {
-                const found_brick b = look_at(v, distances, field.band, {x, y, static_cast<int>(z)});
-                const std::uint32_t in_band = b.band.count(), inside = b.inside.count();
-                if (in_band != 0 || (result.is_level_set && inside != 0 && inside != 512))
-                    layers[z].push_back(b);
-                else if (result.is_level_set && inside == 512)
-                    inner[z].push_back(b.key);
-            }
-    });
-    std::vector<const found_brick*> sorted;
-    for (const auto& layer : layers)
-        for (const found_brick& b : layer) sorted.push_back(&b);
-    std::sort(sorted.begin(), sorted.end(), [](const found_brick* a, const found_brick* b) { return a->key < b->key; });
+    std::vector<found_layer> layers(static_cast<std::size_t>(bricks.z));
+    const bool is_read = distances.read != nullptr;
+    if (is_read)
+        read_layers(shape, distances, threads, bricks, layers);
+    else
+        parallel_for(layers.size(), threads, [&](std::size_t z) {
+            const std::byte* const there = distances.data.data() + bytes_before(v, distances, static_cast<int>(z));
+            for (int y = 0; y < bricks.y; ++y)
+                for (int x = 0; x < bricks.x; ++x) look_at(shape, there, {x, y, static_cast<int>(z)}, layers[z]);
+        });
+    struct place {
+        const found_brick* brick;
+        std::size_t layer;
+    };
+    std::vector<place> sorted;
+    float greatest = 0;
+    for (std::size_t z = 0; z < layers.size(); ++z) {
+        for (const found_brick& b : layers[z].bricks) sorted.push_back({&b, z});
+        greatest = std::max(greatest, layers[z].greatest);
+        result.is_cut = result.is_cut || (!is_whole && field.is_signed && layers[z].is_cut);
+    }
+    result.background = is_whole ? greatest : field.band;
+    std::sort(sorted.begin(), sorted.end(), [](const place& a, const place& b) { return a.brick->key < b.brick->key; });
     sparse_volume& band = result.band;
     band.shape.extent = v.extent;
     band.shape.origin = v.origin;
     band.shape.voxel_size = v.voxel_size;
     std::uint64_t rank = 0;
-    for (const found_brick* b : sorted) {
-        band.keys.push_back(b->key);
-        band.masks.push_back(b->band);
+    for (const place& p : sorted) {
+        band.keys.push_back(p.brick->key);
+        band.masks.push_back(p.brick->band);
         band.offsets.push_back(rank);
-        if (result.is_level_set) result.inside.push_back(b->inside);
-        rank += b->band.count();
+        if (result.is_level_set) result.inside.push_back(p.brick->inside);
+        rank += p.brick->band.count();
     }
     if (!sorted.empty()) band.offsets.push_back(rank);
     std::vector<std::uint64_t> keys;
-    for (const auto& layer : inner) keys.insert(keys.end(), layer.begin(), layer.end());
+    for (const found_layer& layer : layers) keys.insert(keys.end(), layer.inner.begin(), layer.inner.end());
     std::sort(keys.begin(), keys.end());
     result.in_inside = tiles_of(keys);
 
-    const voxelpipe::brick_table table = band.table();
-    for (const channel& from : v.channels) {
+    for (std::size_t c = 0; c < v.channels.size(); ++c) {
+        const channel& from = v.channels[c];
         channel to{from.name, from.type, from.components, {}};
-        const std::size_t size = size_of(from.type) * static_cast<std::size_t>(from.components);
+        const std::size_t size = value_size(from);
         to.data.resize(static_cast<std::size_t>(rank) * size);
-        constexpr std::uint64_t block = 256;
-        parallel_for(static_cast<std::size_t>((table.count + block - 1) / block), threads, [&](std::size_t n) {
-            for (std::uint64_t b = n * block; b < std::min(table.count, (n + 1) * block); ++b)
-                voxelpipe::for_each_voxel_in(table, b, [&](const glm::ivec3& p, std::uint64_t r) {
-                    std::memcpy(to.data.data() + static_cast<std::size_t>(r) * size,
-                                from.data.data() + static_cast<std::size_t>(v.index(p.x, p.y, p.z)) * size, size);
+        constexpr std::size_t block = 256;
+        parallel_for((sorted.size() + block - 1) / block, threads, [&](std::size_t n) {
+            for (std::size_t b = n * block; b < std::min(sorted.size(), (n + 1) * block); ++b) {
+                const auto& [brick, layer] = sorted[b];
+                std::byte* const values = to.data.data() + static_cast<std::size_t>(band.offsets[b]) * size;
+                if (is_read) {
+                    std::memcpy(values, layers[layer].values[c].data() + brick->first_value * size,
+                                brick->band.count() * size);
+                    continue;
+                }
+                const std::byte* const there = from.data.data() + bytes_before(v, from, static_cast<int>(layer));
+                for_each_in_band(v, *brick, [&](std::size_t at, std::size_t number) {
+                    std::memcpy(values + number * size, there + at * size, size);
                 });
+            }
         });
+        for (found_layer& layer : layers)
+            if (is_read) layer.values[c] = {};
         band.channels.push_back(std::move(to));
     }
     return result;
@@ -160,21 +261,9 @@ void add_level(volume& v, double level) {
                 if (static_cast<double>(value_at(distances, v.index(i, j, k))) <= level) v.set_bit(bits, i, j, k);
 }
 
-std::string cut_band_warning(const volume& v) {
-    if (!v.distances || !v.distances->is_signed || !std::isfinite(v.distances->band)) return "";
-    const channel& c = *v.find("distance");
-    const auto is_cut = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
-        return value_at(c, v.index(x, y, z)) < v.distances->band;
-    };
-    const auto& [nx, ny, nz] = v.extent;
-    bool cut = false;
-    for (std::int64_t z = 0; z < nz && !cut; ++z)
-        for (std::int64_t y = 0; y < ny && !cut; ++y) {
-            const std::int64_t step =
-                z == 0 || z == nz - 1 || y == 0 || y == ny - 1 ? 1 : std::max<std::int64_t>(nx - 1, 1);
-            for (std::int64_t x = 0; x < nx && !cut; x += step) cut = is_cut(x, y, z);
-        }
-    return cut ? "the band is cut off at the grid's sides, where the level set is not closed: --padding of one voxel "
+std::string cut_band_warning(const band_bricks& field) {
+    return field.is_cut
+               ? "the band is cut off at the grid's sides, where the level set is not closed: --padding of one voxel "
                  "more than the band keeps it whole"
                : "";
 }

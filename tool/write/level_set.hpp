@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A dense distance field as the bricks of its band, which is what .nvdb and .vdb hold.
+// A distance field as the bricks of its band, which is what .nvdb and .vdb hold.
 
 #include "model/sparse_volume.hpp"
 #include "model/volume.hpp"
@@ -24,9 +24,11 @@ struct band_bricks {
     float background = 0;                         // the band's width; of a whole field its greatest distance
     // A narrow band of signed distances in cubic voxels: what OpenVDB calls a level set. Otherwise nothing is inside.
     bool is_level_set = false;
+    bool is_cut = false; // of signed distances in a band: samples at the grid's sides are nearer than its width
 };
 
-// V has `distances` and their channel. THREADS <= 0 takes one for each core.
+// V has `distances` and their channel. Of a field that is read piece by piece (channel::read) eight layers are held at
+// a time, and the band twice at the end. THREADS <= 0 takes one for each core.
 [[nodiscard]] band_bricks find_band(const volume& v, int threads);
 
 // True if a format that shows voxels shows those of a level of distances: all of these but .nvdb and .vdb.
@@ -35,6 +37,6 @@ struct band_bricks {
 void add_level(volume& v, double level);
 
 // One line if the band of a level set is cut off by the grid, so that surfaces there are not closed; else empty.
-[[nodiscard]] std::string cut_band_warning(const volume& v);
+[[nodiscard]] std::string cut_band_warning(const band_bricks& field);
 
 } // namespace voxelize

@@ -193,12 +193,13 @@ void add_distances(nanovdb_file& file, const band_bricks& b, const channel& c) {
 }
 
 // What readers of level sets should know of a field.
-void warn_of_band(const volume& v, const std::filesystem::path& path, const write_options& options) {
+void warn_of_band(const volume& v, const band_bricks& field, const std::filesystem::path& path,
+                  const write_options& options) {
     if (!options.warn) return;
     if (v.distances->is_signed && !are_cubic(v.voxel_size))
         options.warn("\"" + path.string() +
                      "\": level sets have cubic voxels, and this grid's are not: its class is unknown");
-    else if (const std::string warning = cut_band_warning(v); !warning.empty())
+    else if (const std::string warning = cut_band_warning(field); !warning.empty())
         options.warn("\"" + path.string() + "\": " + warning);
 }
 
@@ -337,7 +338,7 @@ std::vector<std::filesystem::path> write_nvdb(const volume& v, const std::filesy
                 file, bricks.band, c, c.name, bricks.band.table(), [](std::uint64_t rank) { return rank; }, path);
     }
     std::vector<std::filesystem::path> files = write_grids(file, path, options);
-    warn_of_band(v, path, options);
+    warn_of_band(v, bricks, path, options);
     return files;
 }
 
@@ -345,8 +346,9 @@ std::vector<std::filesystem::path> write_nvdb(const volume& v, const std::filesy
 std::vector<std::filesystem::path> write_vdb(const volume& v, const std::filesystem::path& path,
                                              const write_options& options) {
     if (!v.distances) return write_vdb(make_sparse(v, options.threads), path, options);
-    std::vector<std::filesystem::path> files = write_vdb(find_band(v, options.threads), path, options);
-    warn_of_band(v, path, options);
+    const band_bricks bricks = find_band(v, options.threads);
+    std::vector<std::filesystem::path> files = write_vdb(bricks, path, options);
+    warn_of_band(v, bricks, path, options);
     return files;
 }
 #endif

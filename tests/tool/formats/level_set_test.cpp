@@ -10,8 +10,15 @@
 
 #include <voxelpipe/sparse/io/nanovdb_layout.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <limits>
+#include <span>
+#include <string>
+#include <utility>
 
 using namespace voxelize;
 using namespace voxelize::testing;
@@ -166,9 +173,35 @@ TEST_F(LevelSet, SignsThatChangeBeyondTheBandAreKept) {
     EXPECT_EQ(0U, grid.tree().num_voxels);
 }
 
+// A field that is read eight layers at a time, with another channel before the distances.
+TEST_F(LevelSet, FieldsThatAreReadPieceByPieceGiveTheSameFile) {
+    for (const std::int64_t n : {40, 43}) {
+        volume whole = ball(n, 9, 1.5F);
+        channel numbers{"number", scalar::i64, 1, {}};
+        numbers.data.resize(static_cast<std::size_t>(whole.num_voxels()) * 8);
+        for (std::int64_t i = 0; i < whole.num_voxels(); ++i) store(numbers.data.data() + 8 * i, i);
+        whole.channels.insert(whole.channels.begin(), numbers);
+        volume pieces = whole;
+        std::size_t most = 0;
+        for (channel& c : pieces.channels) {
+            const std::size_t size = size_of(c.type);
+            c.read = [&most, size, data = std::move(c.data)](std::uint64_t first, std::span<std::byte> to) {
+                most = std::max(most, to.size() / size);
+                std::memcpy(to.data(), data.data() + first * size, to.size());
+            };
+            c.data = {};
+        }
+        write(whole, folder_ / "whole.nvdb");
+        write(pieces, folder_ / "pieces.nvdb");
+        EXPECT_TRUE(read_file(folder_ / "whole.nvdb") == read_file(folder_ / "pieces.nvdb"));
+        EXPECT_EQ(static_cast<std::size_t>(8 * n * n), most) << "voxels at a time";
+        EXPECT_EQ(find_band(whole, 2).is_cut, find_band(pieces, 2).is_cut);
+    }
+}
+
 TEST_F(LevelSet, ABandThatTheGridCutsIsNoticed) {
-    EXPECT_EQ("", cut_band_warning(ball(24, 3, 1.0F)));
-    EXPECT_NE("", cut_band_warning(ball(24, 5.5, 1.0F)));
+    EXPECT_EQ("", cut_band_warning(find_band(ball(24, 3, 1.0F), 1)));
+    EXPECT_NE("", cut_band_warning(find_band(ball(24, 5.5, 1.0F), 1)));
 }
 
 } // namespace

@@ -49,16 +49,36 @@ distance_bytes::distance_bytes(const voxelize_request& request) {
     if (request.distance->sign.rule == solid_rule::exterior) samples += all * 5 / 8;
 }
 
-double written_bytes(const voxelize_request& request) {
-    if (!request.write_bytes) return 0;
+namespace {
+
+// Samples of the band of a surface as large as the grid's.
+double band_samples(const voxelize_request& request) {
     const glm::dvec3 n(request.grid.extent);
     const double samples = n.x * n.y * n.z;
-    // The band of a surface as large as the grid's.
-    const double band = request.distance->is_whole
-                            ? samples
-                            : std::min(samples, 2 * (n.x * n.y + n.y * n.z + n.z * n.x) * 2 * request.distance->band);
+    if (request.distance->is_whole) return samples;
+    return std::min(samples, 2 * (n.x * n.y + n.y * n.z + n.z * n.x) * 2 * request.distance->band);
+}
+// What the writers take beside the volume, whose band they may hold in bricks.
+double writer_bytes(const voxelize_request& request) {
+    if (!request.write_bytes) return 0;
+    const glm::dvec3 n(request.grid.extent);
     constexpr double brick_voxels = 512, filled = 0.5;
-    return volume_bytes(request) + request.write_bytes(std::min(band / filled, samples) / brick_voxels, band, 0);
+    const double band = band_samples(request);
+    return request.write_bytes(std::min(band / filled, n.x * n.y * n.z) / brick_voxels, band, 0);
+}
+
+} // namespace
+
+double written_bytes(const voxelize_request& request) {
+    return request.write_bytes ? volume_bytes(request) + writer_bytes(request) : 0;
+}
+
+double held_band_bytes(const voxelize_request& request) {
+    if (!request.write_bytes) return 0;
+    const double held = writer_bytes(request) - request.write_bytes(0, 0, 0);
+    if (held <= 0) return 0;
+    const glm::dvec3 n(request.grid.extent);
+    return held + volume_bytes(request) / (n.x * n.y * n.z) * band_samples(request);
 }
 
 namespace {
@@ -159,9 +179,13 @@ std::optional<int> layers_of_slabs(const scene& model, const voxelize_request& r
     const bool sees_all = distance.is_signed && distance.sign.rule == solid_rule::exterior;
     const bool has_slabs =
         step > 0 && extent.z > step && !distance.at_corners && !sees_all && request.backend != backend_choice::cuda;
+    const double held = step > 0 ? held_band_bytes(request) : 0;
     const auto need_of = [&](int layers) {
         const voxelize_request part = request_of_layers(request, 0, std::min(extent.z, layers));
-        return distance_need(model, part) + volume_bytes(part);
+        const double drawn = held == 0 ? distance_need(model, part)
+                                       : held + distance_bytes(part).of(static_cast<double>(model.triangle_count()),
+                                                                        static_cast<double>(model.vertex_count()));
+        return drawn + volume_bytes(part);
     };
     std::string what = std::string(distance.is_whole ? "a whole distance field of " : "a distance field of ") +
                        std::to_string(extent.x) + " x " + std::to_string(extent.y) + " x " + std::to_string(extent.z) +

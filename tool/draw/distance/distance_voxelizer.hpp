@@ -33,6 +33,8 @@ struct distance_bytes {
 
 // Bytes of a field that is held whole and written, about; 0 where nothing is written.
 [[nodiscard]] double written_bytes(const voxelize_request& request);
+// Bytes of what holds the band of a field that is drawn in slabs, about; 0 where no output does.
+[[nodiscard]] double held_band_bytes(const voxelize_request& request);
 
 // request.distance is set; request.grid is that of the samples, not cropped. Lines and points have no distances: a
 // warning counts them. A model without triangles gives the band's distance everywhere, or infinity, which a warning

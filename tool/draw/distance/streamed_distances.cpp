@@ -132,7 +132,8 @@ private:
         const double triangle = bytes.triangle + 3 * bytes.vertex + sizeof(corner_record<Varyings>) + 16;
         const double layer = (bytes.samples + (is_kept ? 0 : volume_bytes(request_))) / layers_of_grid;
         constexpr double read_bytes = 4 << 20; // of records at a time
-        const double beside = bytes.threads + room / 8 + read_bytes + (is_kept ? volume_bytes(request_) : 0);
+        const double beside =
+            bytes.threads + room / 8 + read_bytes + (is_kept ? volume_bytes(request_) : held_band_bytes(request_));
         constexpr double used = 0.65; // of the room: what is freed between slabs is not all given back
         slabs::plan_options how;
         how.align = std::max(1, request_.distance->slab_layers);
