@@ -31,7 +31,7 @@ inline constexpr std::uint32_t parity_loads = 4; // groups of row_words that are
 inline constexpr std::uint32_t lane_entries = 32;
 inline constexpr int fill_blocks = 4;
 
-// ---- repair::exterior (solid/device/exterior.cuh) -------------------------------------------------------------------
+// ---- repair::exterior (solid/device/flood_tiles.cuh) ----------------------------------------------------------------
 
 inline constexpr int flood_tile_z = 16; // of a tile of 32 x 32 x 16 voxels, which a warp has in registers
 inline constexpr int flood_blocks = 3;
