@@ -34,7 +34,7 @@ template <int Axis>
 }
 
 // Which touched voxels of one body are outside although the flood does not reach them: their centre sees that of a
-// neighbour that it reaches and no triangle touches.
+// voxel, one or two away along an axis, that it reaches and no triangle touches.
 class seen_from_outside {
 public:
     // touched, outside: with a ring of `ring` voxels around the grid, all of which is outside; kept, not owned.
@@ -54,9 +54,16 @@ public:
         std::uint32_t seen = 0;
         for (int axis = 0; axis < 3; ++axis) {
             const glm::ivec3 step(axis == 0 ? 1 : 0, axis == 1 ? 1 : 0, axis == 2 ? 1 : 0);
-            const glm::ivec3 here(x, y, z), behind = here + step;
-            seen |= open(here - step) & ~crossed(axis, here);
-            seen |= open(behind) & ~crossed(axis, behind);
+            const glm::ivec3 here(x, y, z);
+            // One voxel down, then two; and up.
+            std::uint32_t clear = ~crossed(axis, here);
+            seen |= open(here - step) & clear;
+            clear &= ~crossed(axis, here - step);
+            seen |= open(here - 2 * step) & clear;
+            clear = ~crossed(axis, here + step);
+            seen |= open(here + step) & clear;
+            clear &= ~crossed(axis, here + 2 * step);
+            seen |= open(here + 2 * step) & clear;
         }
         return touched & seen;
     }
@@ -66,8 +73,12 @@ private:
         const glm::ivec3 p = at + ring_;
         return outside_.get_bits(p.x, p.y, p.z) & ~touched_.get_bits(p.x, p.y, p.z);
     }
+    // Segments beyond the first and the last of a row are not crossed: what lies there is outside.
     [[nodiscard]] std::uint32_t crossed(int axis, const glm::ivec3& at) const {
-        return crossed_[axis]->get_bits(at.x, at.y, at.z);
+        const bit_grid& c = *crossed_[axis];
+        const glm::ivec3 e = c.extent();
+        if (at.y < 0 || at.z < 0 || at.y >= e.y || at.z >= e.z) return 0;
+        return at.x < 0 ? c.get_bits(0, at.y, at.z) << -at.x : c.get_bits(at.x, at.y, at.z);
     }
 
     const bit_grid &touched_, &outside_;
@@ -83,7 +94,7 @@ private:
     const stopwatch watch(how.times, &stage_times::fine_raster);
     const row_numbers rows(s.where.extent);
     std::vector<beam_words> beams;
-    const int ring = options.closing + 1;
+    const int ring = options.closing + (options.with_cover ? 1 : 2); // with what touched voxels look at
     for (std::uint32_t draw = 0; draw <= s.body.back(); ++draw) {
         bit_grid grid(s.where.extent + 2 * ring);
         for_each_word(cover, rows, draw, [&](int x, int y, int z, std::uint32_t bits) {

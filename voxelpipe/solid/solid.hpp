@@ -84,8 +84,8 @@ struct solid_options {
     // the grid by itself.
     const solid_slab* slab = nullptr;
     // exterior, vote: voxels that a triangle touches are inside, whatever their centres are. False: a vote decides at
-    // each centre; of a flood's cover those voxels are outside whose centre sees an outside one: no triangle crosses
-    // the segment to the centre of a face neighbour that no triangle touches and the flood reaches. The sign of
+    // each centre; of a flood's cover those voxels are outside whose centre sees the outside: no triangle crosses the
+    // segment to the centre of a voxel, one or two away along an axis, that is reached and not touched. The sign of
     // distances and of surfaces has it so (DISTANCE in docs/design.md). False with another repair, or with exterior of
     // a slab, is refused with bad_solid_options.
     bool with_cover = true;
