@@ -246,10 +246,14 @@ TEST(Solids, ExteriorAndVote) {
     one.expect_same(box_grid({130, 41, 43}), {.repair = vp::repair::exterior, .closing = 35});
 }
 
-// The sides of centres, also where rows end with a word and where bodies reach over the faces of the grid.
+// The sides of centres, also where rows end with a word and where bodies reach over the faces of the grid. Of the
+// broken meshes a flood leaves nothing here unless gaps are closed, of the closed ones it does.
 TEST(Solids, ExteriorAndVoteWithoutTheirCover) {
-    const drawing_of_everything all{broken_meshes(), {{0.0f}, {0.25f}}, {{1, 0.1f}, {2, 3.0f}, {3, -1.0f}}};
-    const drawing_of_bits bits{broken_meshes(), {{}}, {{true}}};
+    std::vector<mesh_data> meshes = broken_meshes();
+    meshes.push_back(ball({9.1f, 8.4f, 10.3f}, 5.7f, 6));
+    meshes.insert(meshes.begin(), ball({26.6f, 15.2f, 12.9f}, 8.2f, 5));
+    const drawing_of_everything all{meshes, {{0.0f}, {0.25f}}, {{1, 0.1f}, {2, 3.0f}, {3, -1.0f}}};
+    const drawing_of_bits bits{meshes, {{}}, {{true}}};
     for (const auto of : all_bodies) {
         vp::solid_options options{.bodies = of, .repair = vp::repair::exterior, .with_cover = false};
         for (const glm::ivec3& extent : {glm::ivec3(37, 26, 25), glm::ivec3(64, 26, 25), glm::ivec3(33, 26, 25)}) {
@@ -260,7 +264,7 @@ TEST(Solids, ExteriorAndVoteWithoutTheirCover) {
         options = {.bodies = of, .repair = vp::repair::vote, .with_cover = false};
         bits.expect_same(box_grid({37, 26, 25}), options);
         bits.expect_same(box_grid({64, 26, 25}).crop({3, 5, 2}, {40, 17, 20}), options);
-        expect_same_lists<std::uint32_t>(broken_meshes(), id_of_fragment{5}, box_grid({37, 26, 25}), options);
+        expect_same_lists<std::uint32_t>(meshes, id_of_fragment{5}, box_grid({37, 26, 25}), options);
     }
 }
 
