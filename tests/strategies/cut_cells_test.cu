@@ -143,6 +143,62 @@ TEST(DeviceCells, ClosedHolesHaveTheBytesOfTheCpu) {
                                  {.repair = vp::repair::close_holes, .max_hole_edges = 5});
 }
 
+// Lists of bodies that share voxels: all arrays of the cpu's, by all axes, of parts of a grid, and without a payload.
+struct listed_cell {
+    std::int64_t units, aperture;
+    std::uint32_t draw, is_cut;
+};
+struct listing {
+    VOXELPIPE_HD auto operator()(const vp::cell_fragment& f) const {
+        return vp::outputs(listed_cell{f.units, f.aperture, f.draw, f.is_cut ? 1u : 0u})
+            .discard_if((f.voxel.x + 3 * f.voxel.y + f.voxel.z) % 11 == 4 && f.draw == 1);
+    }
+};
+template <class Payload, class Shader>
+static void expect_same_lists(const std::vector<mesh_data>& meshes, const vp::grid& g, const Shader& shader,
+                              const vp::cell_options& o) {
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    vp::abuffer<vp::cpu_backend, Payload> a(cpu);
+    vp::abuffer<vp::cuda_backend, Payload> b(gpu);
+    const vp::status expected = draw(cpu, meshes, g, shader, a, o), found = draw(gpu, meshes, g, shader, b, o);
+    ASSERT_TRUE(expected.ok()) << expected.message();
+    ASSERT_TRUE(found.ok()) << found.message();
+    EXPECT_EQ(expected.counts, found.counts);
+    EXPECT_TRUE(expected.cells == found.cells);
+    EXPECT_EQ(a.extent, b.extent);
+    const auto x = a.to_host(cpu), y = b.to_host(gpu);
+    EXPECT_GT(x.primitives.size(), x.voxels.size());
+    device_test::expect_same_bytes(x.voxels, y.voxels, "voxels");
+    device_test::expect_same_bytes(x.offsets, y.offsets, "offsets");
+    device_test::expect_same_bytes(x.primitives, y.primitives, "draws");
+    if constexpr (!std::is_void_v<Payload>) device_test::expect_same_bytes(x.payloads, y.payloads, "payloads");
+}
+
+TEST(DeviceCells, ListsOfBodiesHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{27, 21, 24};
+    const std::vector<mesh_data> meshes{device_test::tied_bodies(20, 7, 4), device_test::ball({12, 9, 11}, 6.3f, 7),
+                                        device_test::ball({15, 10, 12}, 7.1f, 6)};
+    const vp::grid g = device_test::box_grid(extent), part = g.crop({5, 3, 2}, {19, 14, 20});
+    for (int axis = 0; axis < 3; ++axis) {
+        const vp::cell_options each{.bodies = vp::bodies::draw, .axis = axis};
+        expect_same_lists<listed_cell>(meshes, axis == 1 ? part : g, listing{}, each);
+        expect_same_lists<void>(meshes, axis == 0 ? part : g, vp::fraction{}, each);
+    }
+    vp::cuda_backend gpu;
+    vp::abuffer<vp::cuda_backend, float> lists(gpu);
+    EXPECT_TRUE(draw(gpu, meshes, g, vp::fraction{}, lists, {}).ok());
+    const std::size_t drawn = lists.num_voxels();
+    EXPECT_GT(drawn, 1000u);
+    EXPECT_EQ(lists.num_fragments(), drawn);
+    mesh_data bad = device_test::ball({2, 2, 2}, 1.5f, 4);
+    bad.triangles.push_back({0, 1, 1000000});
+    EXPECT_EQ(draw(gpu, {bad}, g, vp::fraction{}, lists, {}).code, vp::status_code::index_out_of_range);
+    EXPECT_EQ(lists.num_voxels(), drawn); // nothing is written
+    EXPECT_TRUE(draw(gpu, {}, g, vp::fraction{}, lists, {}).ok());
+    EXPECT_EQ(lists.num_voxels(), 0u);
+}
+
 // Slabs of a stream on the device, with holes that the host closes: the cpu's whole.
 TEST(DeviceCells, SlabsOfAStreamAreTheWhole) {
     namespace slabs = vp::slabs;

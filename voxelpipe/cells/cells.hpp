@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Cut cells: voxelize_cells draws how much of each voxel is inside, as multiples of 2^-44, into a framebuffer, on the
-// backend whose tag is passed (docs/design.md, "Cut cells"). A voxel that a triangle cuts, or that is inside, gets one
-// fragment. The same draws, vertex shaders, targets, blends, layouts, crops and checks of arguments as voxelize.
+// Cut cells: voxelize_cells draws how much of each voxel is inside, as multiples of 2^-44, into a framebuffer or an
+// A-buffer, on the backend whose tag is passed (docs/design.md, "Cut cells"). A voxel that a triangle cuts, or that is
+// inside, gets one fragment. The same draws, vertex shaders, targets, blends, layouts, crops and checks of arguments as
+// voxelize.
 
+#include <voxelpipe/abuffer.hpp>
 #include <voxelpipe/cells/core/cell_terms.hpp>
 #include <voxelpipe/solid/solid.hpp>
 #include <voxelpipe/voxelize.hpp>
@@ -97,7 +99,7 @@ struct fraction {
 namespace core {
 
 // Names the call of this module. A backend implements voxelize_cells as run_module(cells_tag, backend, draws, grid,
-// framebuffer_view, options, number of triangles).
+// framebuffer_view or A-buffer, options, number of triangles).
 struct cells_tag {};
 
 // The type that a shader names as `fragment`, and the bits of what it needs.
@@ -158,6 +160,13 @@ template <class Mesh, class VertexShader, class CellShader, class... Targets>
     return false;
 }
 
+template <class Mesh, class VertexShader, class CellShader, class Payload>
+[[nodiscard]] constexpr bool cell_fits_payload() {
+    if constexpr (check_cell_shaders<Mesh, VertexShader, CellShader>())
+        return output_check<cell_output<CellShader>>::template fits_payload<Payload>();
+    return false;
+}
+
 [[nodiscard]] inline status validate(const cell_options& o) {
     const bool repairs = o.repair == repair::none || o.repair == repair::close_holes;
     const bool known = o.bodies <= bodies::draw && o.axis >= 0 && o.axis <= 2 && repairs;
@@ -202,7 +211,31 @@ template <class Backend, class Mesh, class VertexShader, class CellShader, class
     return voxelize_cells(backend, draws, g, fb.view(), options);
 }
 
-// One mesh, into a framebuffer or a framebuffer_view.
+// Draws them into an A-buffer, as materials that share a voxel want it with bodies::draw: a voxel's fragments by
+// ascending draw, which is their number (host_abuffer::fragment_entry::primitive, 0 with bodies::call; primitive_map
+// does not apply). The shader's one output is the payload; it is called twice for each fragment. Every voxel inside is
+// listed, so memory follows the volume. size_overflow for 2^32 voxels or more in the lists of rows along axis 1 or 2.
+template <class Backend, class Mesh, class VertexShader, class CellShader, class Payload>
+[[nodiscard]] status voxelize_cells(Backend& backend, std::span<const draw<Mesh, VertexShader, CellShader>> draws,
+                                    const grid& g, abuffer<Backend, Payload>& lists, const cell_options& options = {}) {
+    if constexpr (core::cell_fits_payload<Mesh, VertexShader, CellShader, Payload>()) {
+        if (const status s = validate(g); !s.ok()) return s;
+        if (const status s = core::validate(options); !s.ok()) return s;
+        const status s = core::validate_draws(draws);
+        if (!s.ok()) return s;
+        if (s.counts.triangles_in == 0) {
+            lists = abuffer<Backend, Payload>(backend);
+            lists.extent = g.extent;
+            return s;
+        }
+        return core::name_bad_triangle(
+            backend, draws, run_module(core::cells_tag{}, backend, draws, g, lists, options, s.counts.triangles_in));
+    } else {
+        return {}; // does not compile: a static_assert has said why
+    }
+}
+
+// One mesh, into a framebuffer, a framebuffer_view or an A-buffer.
 template <class Backend, class... Attributes, class VertexShader, class CellShader, class Output>
 [[nodiscard]] status voxelize_cells(Backend& backend, const mesh_view<Attributes...>& mesh, const grid& g,
                                     const VertexShader& vertex_shader, const CellShader& cell_shader, Output&& out,

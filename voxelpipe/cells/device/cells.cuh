@@ -7,6 +7,7 @@
 
 #include <voxelpipe/cells/device/cell_list_kernels.cuh>
 #include <voxelpipe/cells/device/cell_rows_kernels.cuh>
+#include <voxelpipe/cells/passes/cell_lists.hpp>
 #include <voxelpipe/cells/passes/cell_passes.hpp>
 #include <voxelpipe/cells/passes/link_passes.hpp>
 #include <voxelpipe/device/backend.cuh>
@@ -98,13 +99,21 @@ template <class Terms>
 }
 } // namespace passes
 
-// Implements voxelize_cells into a framebuffer. Arguments are validated. Waits for each of its sums.
+// Implements voxelize_cells. Arguments are validated. Waits for each of its sums.
 template <class Mesh, class VertexShader, class CellShader, class... Targets>
 [[nodiscard]] status
 run_module(cells_tag, cuda_backend& backend, std::span<const draw<Mesh, VertexShader, CellShader>> draws, const grid& g,
            const framebuffer_view<Targets...>& fb, const cell_options& options, std::uint64_t triangles_in) {
     if (const status s = device::check_subsets(draws, backend); !s.ok()) return s;
     return backend.guard([&] { return run_cells(backend, draws, g, fb, options, triangles_in); });
+}
+
+template <class Mesh, class VertexShader, class CellShader, class Payload>
+[[nodiscard]] status
+run_module(cells_tag, cuda_backend& backend, std::span<const draw<Mesh, VertexShader, CellShader>> draws, const grid& g,
+           abuffer<cuda_backend, Payload>& lists, const cell_options& options, std::uint64_t triangles_in) {
+    if (const status s = device::check_subsets(draws, backend); !s.ok()) return s;
+    return backend.guard([&] { return run_cells(backend, draws, g, lists, options, triangles_in); });
 }
 
 // Implements voxelize_links. Arguments are validated. Waits for each of its sums.

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Rows of shaded cells for sparse framebuffers: as lists of voxels with their outputs, or as runs of voxels that have
-// the same values in all targets. Functors for Backend::for_each, the same on every backend.
+// Rows of shaded cells for sparse framebuffers as runs of voxels that have the same values in all targets. Functors for
+// Backend::for_each, the same on every backend.
 
 #include <voxelpipe/cells/passes/cell_walk.hpp>
 #include <voxelpipe/core/morton.hpp>
@@ -13,29 +13,6 @@
 
 namespace voxelpipe::core::passes {
 
-// ---- rows -----------------------------------------------------------------------------------------------------------
-
-// 1 for the first term of a row of the grid; a last element of 0.
-struct mark_cell_rows {
-    const std::uint64_t* keys;
-    std::uint64_t count, keys_a_row;
-    std::uint32_t* is_first;
-
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        is_first[i] = i < count && (i == 0 || keys[i] / keys_a_row != keys[i - 1] / keys_a_row) ? 1 : 0;
-    }
-};
-struct list_cell_rows {
-    const std::uint64_t* keys;
-    std::uint64_t keys_a_row;
-    const std::uint32_t* is_first;
-    const std::uint64_t* place;
-    std::uint64_t* rows; // of the grid, ascending
-
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        if (is_first[i] != 0) rows[place[i]] = keys[i] / keys_a_row;
-    }
-};
 // Morton keys of rows in the whole grid, whose cells' keys have x along the rows.
 struct key_cell_rows {
     const std::uint64_t* rows;
@@ -49,65 +26,6 @@ struct key_cell_rows {
             morton_key(0, static_cast<int>(rows[i] % rows_y) + offset.y, static_cast<int>(rows[i] / rows_y) + offset.z);
         order[i] = static_cast<std::uint32_t>(i);
     }
-};
-
-// ---- lists ----------------------------------------------------------------------------------------------------------
-
-// Voxels with their outputs, row by row. Counted where `num_voxels` is not null, with a 0 behind the last row.
-template <class CellShader, class Payload>
-struct list_shaded_cells {
-    cell_walk<CellShader> walk;
-    const std::uint64_t* rows;
-    std::uint64_t num_rows;
-    glm::ivec3 extent;
-    std::uint64_t* counts; // of the call; null where voxels are written
-    std::uint32_t *num_voxels, *num_fragments;
-    const std::uint64_t *first_voxel, *first_fragment; // of each row
-    std::uint64_t *voxels, *offsets;                   // linear numbers in the part of the grid
-    Payload* payloads;
-
-    VOXELPIPE_ANY_CALLABLE
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        cell_tally tally;
-        if (num_voxels != nullptr) {
-            counted_voxels none;
-            if (i < num_rows) walk.template go<true>(rows[i], i, tally, none);
-            num_voxels[i] = static_cast<std::uint32_t>(tally.voxels);
-            num_fragments[i] = static_cast<std::uint32_t>(tally.fragments);
-            tally.add_to(counts);
-        } else {
-            written_voxels to{*this, first_voxel[i], first_fragment[i]};
-            walk.template go<true>(rows[i], i, tally, to);
-        }
-    }
-
-private:
-    struct counted_voxels {
-        VOXELPIPE_HD void begin(const glm::ivec3&) {}
-        template <class Values>
-        VOXELPIPE_HD void add(const Values&) {}
-        VOXELPIPE_HD void end(const glm::ivec3&, int, int) {}
-    };
-    struct written_voxels {
-        const list_shaded_cells& of;
-        std::uint64_t voxel, fragment;
-
-        VOXELPIPE_HD void begin(const glm::ivec3& p) {
-            const auto wide = [](int n) { return static_cast<std::uint64_t>(n); };
-            of.voxels[voxel] = (wide(p.z) * wide(of.extent.y) + wide(p.y)) * wide(of.extent.x) + wide(p.x);
-            of.offsets[voxel++] = fragment;
-        }
-        template <class Values>
-        VOXELPIPE_HD void add(const Values& values) {
-            of.payloads[fragment++] = values;
-        }
-        VOXELPIPE_HD void end(const glm::ivec3&, int, int) {}
-    };
-};
-struct end_offsets {
-    std::uint64_t* last;
-    std::uint64_t value;
-    VOXELPIPE_HD void operator()(std::uint64_t) const { *last = value; }
 };
 
 // ---- runs -----------------------------------------------------------------------------------------------------------
@@ -176,7 +94,7 @@ private:
             });
         }
         template <class Values>
-        VOXELPIPE_HD void add(const Values& fragment) {
+        VOXELPIPE_HD void add(std::uint32_t, const Values& fragment) {
             for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
                 pack_element<I, Targets...>::type::traits::apply(voxelpipe::get<I>(sums), voxelpipe::get<I>(fragment));
             });

@@ -57,8 +57,8 @@ struct cell_walk {
     int axis, row_extent;
 
     // Goes along a row of the grid; place: of its cursors. For each voxel that keeps a fragment, or for each run of
-    // them (unless Each), calls visit.begin(voxel in the part), visit.add(values) for the fragments by ascending body,
-    // and visit.end(voxel, w, end), of the voxels [w, end) of the row.
+    // them (unless Each), calls visit.begin(voxel in the part), visit.add(body, values) for the fragments by ascending
+    // body, and visit.end(voxel, w, end), of the voxels [w, end) of the row.
     VOXELPIPE_ANY_CALLABLE
     template <bool Each, class Visit>
     VOXELPIPE_HD void go(std::uint64_t row, std::uint64_t place, cell_tally& tally, Visit& visit) const {
@@ -132,7 +132,7 @@ struct cell_walk {
         tally.fragments += n;
         if (!is_drawn) visit.begin(p);
         is_drawn = true;
-        visit.add(out.values);
+        visit.add(static_cast<std::uint32_t>(body), out.values);
     }
 
 private:
@@ -177,7 +177,7 @@ struct blended_voxel {
         });
     }
     template <class Values>
-    VOXELPIPE_HD void add(const Values& values) {
+    VOXELPIPE_HD void add(std::uint32_t, const Values& values) {
         for_each_index<sizeof...(Targets)>([&]<std::size_t I>() {
             pack_element<I, Targets...>::type::traits::apply(voxelpipe::get<I>(sums), voxelpipe::get<I>(values));
         });

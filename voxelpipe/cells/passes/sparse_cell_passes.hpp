@@ -6,7 +6,7 @@
 // values, and the runs become bricks and tiles; or their fragments are listed, and the lists become bricks.
 
 #include <voxelpipe/cells/passes/cell_bricks.hpp>
-#include <voxelpipe/cells/passes/cell_passes.hpp>
+#include <voxelpipe/cells/passes/cell_lists.hpp>
 #include <voxelpipe/cells/passes/cell_runs.hpp>
 #include <voxelpipe/cells/sparse_cells.hpp>
 #include <voxelpipe/sparse/passes/all_outputs.hpp>
@@ -166,20 +166,6 @@ private:
     buffer<std::uint32_t> sources_;   // of the tiles: runs of voxels
 };
 
-// The rows of the grid that terms lie in, ascending.
-template <class Backend, class Terms>
-[[nodiscard]] typename Backend::template buffer<std::uint64_t> find_cell_rows(Backend& backend,
-                                                                              const passes::record_list<Terms>& list) {
-    const std::uint64_t keys_a_row = list.keys_of.slots * list.keys_of.bodies;
-    typename Backend::template buffer<std::uint32_t> is_first(backend, list.count + 1);
-    typename Backend::template buffer<std::uint64_t> place(backend, list.count + 1);
-    backend.for_each(list.count + 1, passes::mark_cell_rows{list.keys, list.count, keys_a_row, is_first.data()});
-    typename Backend::template buffer<std::uint64_t> rows(backend, backend.sum(is_first, place));
-    backend.for_each(list.count,
-                     passes::list_cell_rows{list.keys, keys_a_row, is_first.data(), place.data(), rows.data()});
-    return rows;
-}
-
 // Ends a call that makes_cell_tiles.
 template <class Backend, class CellShader, class... Targets>
 [[nodiscard]] status store_cell_runs(Backend& backend, listed_cells<Backend, CellShader>& cells,
@@ -248,44 +234,10 @@ template <class Backend, class CellShader, class... Targets>
                                       const typename Backend::template buffer<std::uint64_t>& rows, const grid& g,
                                       sparse_framebuffer<Backend, Targets...>& fb) {
     using payload = typename outputs_payload<cell_output<CellShader>>::type;
-    using numbers = typename Backend::template buffer<std::uint64_t>;
-    const std::size_t n = rows.size();
     abuffer<Backend, payload> lists(backend);
-    lists.extent = g.extent;
-    {
-        typename Backend::template buffer<std::uint32_t> num_voxels(backend, n + 1), num_fragments(backend, n + 1);
-        numbers first_voxel(backend, n + 1), first_fragment(backend, n + 1);
-        passes::list_shaded_cells<CellShader, payload> shade{cells.walk(n),
-                                                             rows.data(),
-                                                             n,
-                                                             g.extent,
-                                                             cells.counts(),
-                                                             num_voxels.data(),
-                                                             num_fragments.data(),
-                                                             first_voxel.data(),
-                                                             first_fragment.data(),
-                                                             nullptr,
-                                                             nullptr,
-                                                             nullptr};
-        backend.for_each(n + 1, shade);
-        const std::uint64_t voxels = backend.sum(num_voxels, first_voxel);
-        const std::uint64_t fragments = backend.sum(num_fragments, first_fragment);
-        // A row's fragments are counted in 32 bits, all of them in 64.
-        if (voxels >= listed_cells<Backend, CellShader>::most - 2 || fragments != cells.result().counts.fragments)
-            return cells.fail(status_code::size_overflow);
-        if (voxels != 0) {
-            lists.voxels = numbers(backend, static_cast<std::size_t>(voxels));
-            lists.offsets = numbers(backend, static_cast<std::size_t>(voxels + 1));
-            lists.payloads = typename Backend::template buffer<payload>(backend, static_cast<std::size_t>(fragments));
-            shade.num_voxels = nullptr;
-            shade.voxels = lists.voxels.data();
-            shade.offsets = lists.offsets.data();
-            shade.payloads = lists.payloads.data();
-            backend.for_each(n, shade);
-            backend.for_each(1, passes::end_offsets{lists.offsets.data() + voxels, fragments});
-        }
-    }
-    status s = cells.result();
+    constexpr std::uint64_t most_voxels = listed_cells<Backend, CellShader>::most - 3;
+    const status s = shade_into_lists(backend, cells, rows, g.extent, false, most_voxels, lists);
+    if (!s.ok()) return s;
     const status stored = run_module(store_sparse_tag{}, backend, g, lists, fb, s);
     return stored.ok() ? s : stored;
 }
