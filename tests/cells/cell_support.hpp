@@ -64,7 +64,9 @@ inline cell_values library_cells(const mesh& m, const vp::grid& g, const vp::cel
 }
 
 inline constexpr std::int64_t whole_cell = std::int64_t{1} << vp::core::cell_unit_bits;
-inline constexpr double bound = 2.5 * 1.125; // of errors, in u, a triangle of the voxel
+inline constexpr double bound = 2.5 * 1.125;      // of errors, in u, a triangle of the voxel
+inline constexpr double face_bound = 2.0 * 1.125; // a triangle of a face
+inline constexpr double slack = 0.001;            // of the oracle, whose sums are long doubles
 
 // Snapped triangles of a unit grid.
 inline std::vector<oracle::lattice_triangle> snapped(const mesh& m, int fraction_bits) {

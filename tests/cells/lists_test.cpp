@@ -90,7 +90,7 @@ TEST(CellLists, BodiesHaveTheFractionsOfTheOracle) {
                             part += of.fraction;
                             touching += of.touches ? 1 : 0;
                         }
-                        const double margin = bound * static_cast<double>(touching) + 0.001; // the oracle's long double
+                        const double margin = bound * static_cast<double>(touching) + slack;
                         if (next == found.size() || found[next].primitive != body) {
                             ASSERT_LE(std::abs(std::ldexp(part, 44)), margin) << round << ' ' << body;
                             continue;

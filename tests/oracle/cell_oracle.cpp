@@ -134,6 +134,8 @@ cell_part cell_of(const lattice_triangle& t, int fraction_bits, const std::array
     part.fraction = part.cover;
     if (!is_flat) part.fraction += scale * std::ldexp(integrate(within, &below_upper), -fraction_bits);
     part.touches = !within.corners.empty();
+    part.touches_face = false;
+    for (const corner& c : within.corners) part.touches_face = part.touches_face || at(above_lower, c) == 0;
 
     const auto from_centre = [&](int axis) { // twice
         half_plane h = side(axis, voxel[static_cast<std::size_t>(axis)] * size, 1);
@@ -143,6 +145,7 @@ cell_part cell_of(const lattice_triangle& t, int fraction_bits, const std::array
         const half_plane h = from_centre(axis);
         long double& m = part.moment[static_cast<std::size_t>(axis)];
         m = scale * std::ldexp(integrate(below, &h), -fraction_bits - 1);
+        part.cover_moment[static_cast<std::size_t>(axis) - 1] = m;
         if (!is_flat) m += scale * std::ldexp(integrate(within, h, below_upper), -2 * fraction_bits - 1);
     }
     // Of t (1 - t) / 2, where t is the distance from the lower face.

@@ -16,8 +16,10 @@ namespace oracle {
 struct cell_part {
     long double fraction; // winding number, integrated over the voxel: of rows along x, positive where n_x < 0
     long double cover;    // of the pixel by the part at x below the voxel: likewise
-    bool touches;         // the closed triangle meets the closed voxel
-    std::array<long double, 3> moment; // of the winding number, about the voxel's centre
+    std::array<long double, 2> cover_moment; // the same part's moments in y and z, about the pixel's centre
+    bool touches;                            // the closed triangle meets the closed voxel
+    bool touches_face;                       // and its closed lower face along x
+    std::array<long double, 3> moment;       // of the winding number, about the voxel's centre
     // Of the part in the voxel, in faces of a voxel, and its moment about the centre; parts in a plane between two
     // voxels belong to the lower one.
     long double area;

@@ -128,6 +128,33 @@ TEST(DeviceCells, MeasuresHaveTheBytesOfTheCpu) {
                                      {.bodies = axis == 2 ? vp::bodies::draw : vp::bodies::call, .axis = axis});
 }
 
+// The centroids of faces, by themselves and beside all else.
+template <class Fragment>
+struct faces_measured {
+    using fragment = Fragment;
+    VOXELPIPE_HD auto operator()(const fragment& f) const {
+        const glm::vec3 &a = f.aperture_centroid, &b = f.next_aperture_centroid;
+        return vp::outputs(a.x, a.y, a.z, b.x, b.y, b.z, f.aperture, f.next_aperture);
+    }
+};
+template <class Backend>
+using face_targets = vp::framebuffer<Backend, replaced<float>, replaced<float>, replaced<float>, replaced<float>,
+                                     replaced<float>, replaced<float>, replaced<std::int64_t>, replaced<std::int64_t>>;
+
+TEST(DeviceCells, FacesHaveTheBytesOfTheCpu) {
+    const glm::ivec3 extent{41, 21, 24};
+    const std::vector<mesh_data> meshes{device_test::tied_bodies(20, 7, 4), device_test::ball({19, 9, 11}, 8.3f, 7),
+                                        device_test::long_triangles(extent, 5, 3)};
+    const vp::grid g = device_test::box_grid(extent);
+    for (int axis = 0; axis < 3; ++axis)
+        expect_same<face_targets>(meshes, axis == 1 ? g.crop({5, 3, 2}, {35, 14, 20}) : g,
+                                  faces_measured<vp::measured_cell<vp::cell_value::faces>>{},
+                                  {.bodies = axis == 2 ? vp::bodies::draw : vp::bodies::call, .axis = axis});
+    using all = vp::measured_cell<vp::cell_value::centroid, vp::cell_value::area, vp::cell_value::sheets,
+                                  vp::cell_value::faces>;
+    expect_same<face_targets>(meshes, g, faces_measured<all>{});
+}
+
 // Cones over the holes of each body, or of all together, in parts of a grid too.
 TEST(DeviceCells, ClosedHolesHaveTheBytesOfTheCpu) {
     const glm::ivec3 extent{22, 21, 23};

@@ -54,7 +54,8 @@ struct cell_fragment {
 enum class cell_value : std::uint8_t {
     centroid, // of the part inside
     area,     // of the mesh within the voxel, and that area's centroid
-    sheets    // whether more than one sheet of the surface cuts the voxel
+    sheets,   // whether more than one sheet of the surface cuts the voxel
+    faces     // the centroids of the two apertures
 };
 
 namespace core {
@@ -77,6 +78,13 @@ struct value_of_cell<cell_value::sheets> {
     // The triangles that cut the voxel (is_cut) are no single sheet. Two of them are of one sheet if they share an
     // edge, by its snapped ends, that meets the closed voxel, or if such neighbours link them.
     bool is_multi_cut;
+};
+template <>
+struct value_of_cell<cell_value::faces> {
+    // The middles of the inside parts of the voxel's lower and upper face along the axis: from the face's centre, in
+    // voxels, -0.5 to 0.5, and 0 along the axis. 0 where the aperture is less than 2^-20 or the quotient lies more than
+    // 2^-10 beyond the face, as overlapping and inverted parts can have it.
+    glm::vec3 aperture_centroid, next_aperture_centroid;
 };
 
 } // namespace core
@@ -118,7 +126,8 @@ template <class Fragment>
 inline constexpr unsigned
     needs_of_cells = (std::is_base_of_v<value_of_cell<cell_value::centroid>, Fragment> ? needs_centroid : 0) |
                      (std::is_base_of_v<value_of_cell<cell_value::area>, Fragment> ? needs_area : 0) |
-                     (std::is_base_of_v<value_of_cell<cell_value::sheets>, Fragment> ? needs_sheets : 0);
+                     (std::is_base_of_v<value_of_cell<cell_value::sheets>, Fragment> ? needs_sheets : 0) |
+                     (std::is_base_of_v<value_of_cell<cell_value::faces>, Fragment> ? needs_faces : 0);
 
 // True of a cell's shader that says so by a member `static constexpr bool ignores_voxel = true`, and of a constant:
 // what it returns does not depend on cell_fragment::voxel.

@@ -30,15 +30,19 @@ template <int Bits>
 
 // ---- what is asked for ----------------------------------------------------------------------------------------------
 
-inline constexpr unsigned needs_centroid = 1, needs_area = 2, needs_sheets = 4; // bits
+inline constexpr unsigned needs_centroid = 1, needs_area = 2, needs_sheets = 4, needs_faces = 8; // bits
 
 // What a triangle adds to a row: to the cover before the voxel's upper face, and to the volume within the voxel.
 struct cell_terms {
     std::int64_t cover, volume; // a and c, in u
 };
-// Moments about the voxel's centre, in u: of the cover, and of the volume.
+// Moments of the cover about the pixel's centre, in u.
+struct cover_moment_terms {
+    std::int64_t cover_y, cover_z;
+};
+// Moments of the volume about the voxel's centre, in u.
 struct moment_terms {
-    std::int64_t cover_y, cover_z, volume_x, volume_y, volume_z;
+    std::int64_t volume_x, volume_y, volume_z;
 };
 // The part's area, and its moments about the voxel's centre.
 struct area_terms {
@@ -50,13 +54,17 @@ struct sheet_terms {
 template <int>
 struct no_terms {};
 template <unsigned Needs>
-struct terms_of_needs : cell_terms,
-                        std::conditional_t<(Needs & needs_centroid) != 0, moment_terms, no_terms<0>>,
-                        std::conditional_t<(Needs & needs_area) != 0, area_terms, no_terms<1>>,
-                        std::conditional_t<(Needs & needs_sheets) != 0, sheet_terms, no_terms<2>> {};
+struct terms_of_needs
+    : cell_terms,
+      std::conditional_t<(Needs & (needs_centroid | needs_faces)) != 0, cover_moment_terms, no_terms<3>>,
+      std::conditional_t<(Needs & needs_centroid) != 0, moment_terms, no_terms<0>>,
+      std::conditional_t<(Needs & needs_area) != 0, area_terms, no_terms<1>>,
+      std::conditional_t<(Needs & needs_sheets) != 0, sheet_terms, no_terms<2>> {};
 template <>
 struct terms_of_needs<0> : cell_terms {};
 
+template <class Terms>
+inline constexpr bool has_cover_moments = std::is_base_of_v<cover_moment_terms, Terms>;
 template <class Terms>
 inline constexpr bool has_moments = std::is_base_of_v<moment_terms, Terms>;
 template <class Terms>

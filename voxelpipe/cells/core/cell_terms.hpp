@@ -208,7 +208,7 @@ VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_
                                          std::int64_t j, std::int64_t k, Visit&& visit) {
     const std::int64_t y = j << t.fraction, z = k << t.fraction;
     const auto oriented = [&](std::int64_t v) { return t.is_odd ? -v : v; };
-    pixel_sums row = pixel_cover<has_moments<Terms>>(t, y, z);
+    pixel_sums row = pixel_cover<has_cover_moments<Terms>>(t, y, z);
     row = {oriented(row.cover), oriented(row.y), oriented(row.z)};
     cell_span span{-1, -1}; // in the lower plane of the lowest voxel
     if (t.reach[0] > 1)
@@ -232,7 +232,7 @@ VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_
         if (i >= box.hi[0]) { // all that lies behind
             Terms terms{};
             terms.cover = row.cover - so_far.cover;
-            if constexpr (has_moments<Terms>) {
+            if constexpr (has_cover_moments<Terms>) {
                 terms.cover_y = row.y - so_far.y;
                 terms.cover_z = row.z - so_far.z;
             }
@@ -248,14 +248,14 @@ VOXELPIPE_HD void for_each_cell_of_pixel(const cell_triangle<Int>& t, const cut_
         pixel_sums before = row;
         if (!is_last) {
             before.cover = oriented(round_to_cell_units(sum_polygon<false>(t, corners, lower, 0).cover));
-            if constexpr (has_moments<Terms>) {
+            if constexpr (has_cover_moments<Terms>) {
                 const polygon_moments m = sum_moments<false>(t, corners, lower, 0);
                 before.y = oriented(round_to_cell_units(m.cover_y));
                 before.z = oriented(round_to_cell_units(m.cover_z));
             }
         }
         terms.cover = before.cover - so_far.cover;
-        if constexpr (has_moments<Terms>) {
+        if constexpr (has_cover_moments<Terms>) {
             terms.cover_y = before.y - so_far.y;
             terms.cover_z = before.z - so_far.z;
         }
@@ -306,11 +306,11 @@ VOXELPIPE_HD void visit_only_cell(const cell_triangle<Int>& t, const cell_box& b
             for (int c = 0; c < 3; ++c) measure_corner(t, corners, c, 0, 0);
             add_parts(t, corners, whole, corner, areas, terms);
         }
-        if constexpr (has_moments<Terms>) { // of edges within the pixel these are rounded, unlike their covers
-            const pixel_sums row = pixel_cover<true>(t, 0, 0);
-            terms.cover_y = t.is_odd ? -row.y : row.y;
-            terms.cover_z = t.is_odd ? -row.z : row.z;
-        }
+    }
+    if constexpr (has_cover_moments<Terms>) { // of edges within the pixel these are rounded, unlike their covers
+        const pixel_sums row = pixel_cover<true>(t, 0, 0);
+        terms.cover_y = t.is_odd ? -row.y : row.y;
+        terms.cover_z = t.is_odd ? -row.z : row.z;
     }
     terms.cover = n * (std::int64_t{1} << (cell_unit_bits - 2 * t.fraction - 1));
     if (is_within) {

@@ -127,14 +127,14 @@ public:
             if (is_before) {
                 const terms_type& t = list.terms[list.order[sums.at + lane()]];
                 cover = static_cast<std::uint64_t>(t.cover);
-                if constexpr (core::has_moments<terms_type>) {
+                if constexpr (core::has_cover_moments<terms_type>) {
                     y = static_cast<std::uint64_t>(t.cover_y);
                     z = static_cast<std::uint64_t>(t.cover_z);
                 }
             }
             sums.at += static_cast<unsigned>(__popc(lanes));
             add(sums.aperture, warp_sum(cover));
-            if constexpr (core::has_moments<terms_type>) {
+            if constexpr (core::has_cover_moments<terms_type>) {
                 sums.y += warp_sum(y);
                 sums.z += warp_sum(z);
             }
@@ -170,19 +170,20 @@ public:
         typename cursor::slot_sums sums{};
         if (has_any) sums = own.take(list);
         auto before = static_cast<std::uint64_t>(carry.aperture);
-        if constexpr (core::has_moments<terms_type>) {
-            sums.moments.y += carry.y;
-            sums.moments.z += carry.z;
-        }
+        [[maybe_unused]] std::uint64_t y = carry.y, z = carry.z; // moments of what lies before this lane's voxel
         if (found != 0) {
             before += sum_of_lower_lanes(sums.cover);
             add(carry.aperture, warp_sum(sums.cover));
-            if constexpr (core::has_moments<terms_type>) {
-                sums.moments.y += sum_of_lower_lanes(own.y);
-                sums.moments.z += sum_of_lower_lanes(own.z);
+            if constexpr (core::has_cover_moments<terms_type>) {
+                y += sum_of_lower_lanes(own.y);
+                z += sum_of_lower_lanes(own.z);
                 carry.y += warp_sum(own.y);
                 carry.z += warp_sum(own.z);
             }
+        }
+        if constexpr (core::has_cover_moments<terms_type>) {
+            sums.before = {y, z};
+            sums.behind = {y + own.y, z + own.z};
         }
         if (place.x < walk_.row_extent)
             walk_.shade_body(body, place, place.x + 1, sums, static_cast<std::int64_t>(before), own.at, is_drawn, tally,

@@ -89,9 +89,11 @@ struct cell_record {
         const Terms& t = other.terms;
         add(terms.cover, t.cover);
         add(terms.volume, t.volume);
-        if constexpr (has_moments<Terms>) {
+        if constexpr (has_cover_moments<Terms>) {
             add(terms.cover_y, t.cover_y);
             add(terms.cover_z, t.cover_z);
+        }
+        if constexpr (has_moments<Terms>) {
             add(terms.volume_x, t.volume_x);
             add(terms.volume_y, t.volume_y);
             add(terms.volume_z, t.volume_z);

@@ -48,7 +48,11 @@ struct record_list {
 };
 
 // Sums of a voxel's terms, and of its row up to it, in two's complement: they may wrap on their way.
+template <int>
 struct no_sums {};
+struct face_totals {
+    std::uint64_t y, z; // moments of a face's part inside, about the face's centre
+};
 struct moment_totals {
     std::uint64_t x, y, z;
 };
@@ -69,14 +73,16 @@ struct cell_cursor {
         std::uint64_t first; // of the slot's terms, which end at the cursor
         std::uint64_t cover, volume;
         bool has_any;
-        std::conditional_t<has_moments<Terms>, moment_totals, no_sums> moments; // of the voxel
-        std::conditional_t<has_areas<Terms>, area_totals, no_sums> areas;
+        std::conditional_t<has_cover_moments<Terms>, face_totals, no_sums<0>> before; // of the voxel's lower face
+        std::conditional_t<has_cover_moments<Terms>, face_totals, no_sums<1>> behind; // of its upper face
+        std::conditional_t<has_moments<Terms>, moment_totals, no_sums<2>> moments;    // of the terms alone
+        std::conditional_t<has_areas<Terms>, area_totals, no_sums<3>> areas;
     };
     // Adds up the terms of the next slot.
     [[nodiscard]] VOXELPIPE_HD slot_sums take(const record_list<Terms>& list) {
         slot_sums s{};
         s.first = at;
-        if constexpr (has_moments<Terms>) s.moments = {0, y, z};
+        if constexpr (has_cover_moments<Terms>) s.before = {y, z};
         for (; at < list.count && list.keys[at] == next_key; ++at) {
             const Terms& t = list.terms[list.order[at]];
             s.cover += static_cast<std::uint64_t>(t.cover);
@@ -86,6 +92,8 @@ struct cell_cursor {
                 s.moments.x += static_cast<std::uint64_t>(t.volume_x);
                 s.moments.y += static_cast<std::uint64_t>(t.volume_y);
                 s.moments.z += static_cast<std::uint64_t>(t.volume_z);
+            }
+            if constexpr (has_cover_moments<Terms>) {
                 y += static_cast<std::uint64_t>(t.cover_y);
                 z += static_cast<std::uint64_t>(t.cover_z);
             }
@@ -96,6 +104,7 @@ struct cell_cursor {
                 s.areas.z += t.area_z;
             }
         }
+        if constexpr (has_cover_moments<Terms>) s.behind = {y, z};
         ++next_key;
         return s;
     }
@@ -137,6 +146,21 @@ template <class Terms>
     return reached < end;
 }
 
+// Sets the centroid of a part of this size, from its moments about a centre: quotients, clamped to half a voxel. False,
+// and 0, if the part is less than 2^-20, or a quotient lies further than 2^-10 beyond that.
+template <int Count>
+[[nodiscard]] VOXELPIPE_HD bool find_centroid(const std::uint64_t (&moments)[Count], std::int64_t units,
+                                              float (&c)[Count]) {
+    bool is_found = (units < 0 ? -units : units) >= std::int64_t{1} << (cell_unit_bits - 20);
+    for (int i = 0; i < Count && is_found; ++i) {
+        const double q = exact::div(exact::to_double(static_cast<std::int64_t>(moments[i])), exact::to_double(units));
+        c[i] = exact::to_float(q < -0.5 ? -0.5 : q > 0.5 ? 0.5 : q);
+        is_found = q >= -0.5 - 0x1p-10 && q <= 0.5 + 0x1p-10;
+    }
+    for (int i = 0; i < Count && !is_found; ++i) c[i] = 0.0f;
+    return is_found;
+}
+
 // Sets what a fragment has beside a cell_fragment's members. at: the voxel along the rows and the two other axes; end:
 // of its terms. False if its centroid is lost.
 template <class Terms, class Fragment>
@@ -144,17 +168,22 @@ template <class Terms, class Fragment>
                                              const glm::ivec3& at, std::uint64_t end,
                                              const typename cell_cursor<Terms>::slot_sums& sums, Fragment& f) {
     bool is_found = true;
-    if constexpr (has_moments<Terms>) {
-        const std::uint64_t moments[3] = {sums.moments.x, sums.moments.y, sums.moments.z};
-        is_found = (f.units < 0 ? -f.units : f.units) >= std::int64_t{1} << (cell_unit_bits - 20);
-        float c[3] = {0.0f, 0.0f, 0.0f};
-        for (int i = 0; i < 3 && is_found; ++i) {
-            const double q =
-                exact::div(exact::to_double(static_cast<std::int64_t>(moments[i])), exact::to_double(f.units));
-            c[i] = exact::to_float(q < -0.5 ? -0.5 : q > 0.5 ? 0.5 : q);
-            is_found = q >= -0.5 - 0x1p-10 && q <= 0.5 + 0x1p-10;
-        }
-        f.centroid = is_found ? turn_back(c[0], c[1], c[2], axis) : glm::vec3(0.0f, 0.0f, 0.0f);
+    if constexpr (std::is_base_of_v<value_of_cell<cell_value::centroid>, Fragment>) {
+        const std::uint64_t moments[3] = {sums.moments.x, sums.before.y + sums.moments.y,
+                                          sums.before.z + sums.moments.z};
+        float c[3];
+        is_found = find_centroid(moments, f.units, c);
+        f.centroid = turn_back(c[0], c[1], c[2], axis);
+    }
+    if constexpr (std::is_base_of_v<value_of_cell<cell_value::faces>, Fragment>) {
+        const auto centroid_of = [&](const face_totals& face, std::int64_t aperture) {
+            const std::uint64_t moments[2] = {face.y, face.z};
+            float c[2];
+            (void)find_centroid(moments, aperture, c);
+            return turn_back(0.0f, c[0], c[1], axis);
+        };
+        f.aperture_centroid = centroid_of(sums.before, f.aperture);
+        f.next_aperture_centroid = centroid_of(sums.behind, f.next_aperture);
     }
     if constexpr (has_areas<Terms>) {
         const area_totals& a = sums.areas;
