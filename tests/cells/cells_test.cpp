@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-// voxelize_cells: closed formulas, the theorems of docs/design.md, crops, order, bodies, open meshes and bad input.
+// voxelize_cells: closed formulas, the theorems of docs/design.md, crops, order, bodies, holes and bad input.
 #include "cell_support.hpp"
 
 #include <algorithm>
@@ -220,43 +220,6 @@ TEST(Cells, BodiesByDraw) {
     EXPECT_EQ(each.status.cells.volume(), call.status.cells.volume());
 }
 
-TEST(Cells, OpenMeshesAreToldByRowsAndEdges) {
-    mesh m = solids::box({1, 1, 1}, {4, 4, 4});
-    m.triangles.erase(m.triangles.begin());
-    const vp::grid g = solids::unit_grid(glm::ivec3(6));
-    EXPECT_EQ(library_cells(m, g).status.cells.open_edges, 3u);
-    EXPECT_EQ(library_cells(m, g, {.count_open_edges = false}).status.cells.open_edges, 0u);
-    const auto rows = [&](int axis) { return library_cells(m, g, {.axis = axis}).status.cells.open_rows; };
-    EXPECT_EQ(std::max({rows(0), rows(1), rows(2)}), 6u); // half of a face of three by three pixels, and its diagonal
-    m.add(mesh(m));                                       // a copy: add() reads what it appends to
-    EXPECT_EQ(library_cells(m, g).status.cells.open_edges, 6u);
-    m.add(m.inside_out());
-    EXPECT_EQ(library_cells(m, g).status.cells.open_edges, 0u);
-    EXPECT_EQ(library_cells(m, g).status.cells.volume(), 0.0);
-}
-
-// Vertices are the same where their places are: of triangles that share none, too.
-TEST(Cells, EdgesJoinPlacesAndNotVertices) {
-    const vp::grid g = solids::unit_grid(glm::ivec3(12));
-    const mesh ball = solids::sphere({6.1f, 5.9f, 6}, 4.3f, 2);
-    mesh apart;
-    for (auto t = ball.triangles.rbegin(); t != ball.triangles.rend(); ++t) {
-        const auto first = static_cast<std::uint32_t>(apart.positions.size());
-        for (const std::uint32_t v : {t->y, t->z, t->x}) apart.positions.push_back(ball.positions[v]);
-        apart.triangles.push_back({first, first + 1, first + 2});
-    }
-    const auto open_edges = [&](const mesh& m) { return library_cells(m, g).status.cells.open_edges; };
-    EXPECT_EQ(open_edges(ball), 0u);
-    EXPECT_EQ(open_edges(apart), 0u);
-    apart.triangles.push_back({0, 1, 1}); // there and back, and an edge without length
-    apart.triangles.push_back({2, 2, 2});
-    EXPECT_EQ(open_edges(apart), 0u);
-    apart.positions[30].y = std::numeric_limits<float>::quiet_NaN(); // a triangle that is dropped
-    EXPECT_EQ(open_edges(apart), 3u);
-    apart.triangles[4] = {12, 14, 13}; // turned
-    EXPECT_EQ(open_edges(apart), 3u + 6u);
-}
-
 // The fraction by a shader that makes no promise.
 struct fraction_of_place {
     VOXELPIPE_HD vp::output<float> operator()(const vp::cell_fragment& f) const { return vp::outputs(f.fraction); }
@@ -427,9 +390,17 @@ TEST(Cells, RowsWhoseSumsMightWrapAreRefused) {
         return vp::voxelize_cells(backend, m.view(), solids::unit_grid(glm::ivec3(1)), vp::passthrough{},
                                   vp::fraction{}, fb, {.count_open_edges = false});
     };
+    const auto value = [&] { return vp::get<0>(fb).to_host(backend)[0]; };
+    vp::get<0>(fb).clear(0.375f);
+    EXPECT_TRUE(vp::clear(backend, fb).ok());
+    EXPECT_EQ(value(), 0.375f);
+    vp::get<0>(fb).clear(0.625f);
     EXPECT_EQ(draw().code, vp::status_code::winding_too_large);
+    EXPECT_EQ(value(), 0.375f); // neither drawn nor cleared
+    vp::get<0>(fb).load();
     for (std::size_t i = 0; i < m.triangles.size(); i += 2) std::swap(m.triangles[i].x, m.triangles[i].y);
     EXPECT_EQ(draw().code, vp::status_code::winding_too_large); // though nearly all cancel, as a block of them does
+    EXPECT_EQ(value(), 0.375f);
     for (glm::uvec3& t : m.triangles) t = glm::uvec3(0, 1, 2);
     m.triangles.resize(m.triangles.size() - 2);
     const vp::status fits = draw();
