@@ -3,7 +3,7 @@
 #pragma once
 
 // Cut cells: fractions, apertures and sums of closed, open and broken meshes, by each axis, by draws and in a crop; all
-// that a shader can ask for; with holes closed; bricks and tiles; and links.
+// that a shader can ask for; with holes closed; lists of bodies; bricks and tiles; and links.
 
 #include "cases.hpp"
 
@@ -23,6 +23,20 @@ struct measures_of_cell {
     VOXELPIPE_HD auto operator()(const fragment& f) const {
         return vp::outputs(f.centroid.x, f.centroid.y, f.centroid.z, f.area, f.area_centroid.x, f.area_centroid.y,
                            f.area_centroid.z, mixed(f.is_multi_cut ? 3u : 2u, f.is_cut ? 1u : 0u));
+    }
+};
+
+struct faces_of_cell {
+    using fragment = vp::measured_cell<vp::cell_value::faces>;
+    VOXELPIPE_HD auto operator()(const fragment& f) const {
+        const glm::vec3 &a = f.aperture_centroid, &b = f.next_aperture_centroid;
+        return vp::outputs(a.x, a.y, a.z, b.x, b.y, b.z);
+    }
+};
+
+struct units_of_cell {
+    VOXELPIPE_HD auto operator()(const vp::cell_fragment& f) const {
+        return vp::outputs(f.units).discard_if(f.voxel.x % 7 == 3 && f.draw == 1);
     }
 };
 
@@ -60,6 +74,25 @@ void cell_measures(Backend& backend, digest& d, const std::vector<mesh_data>& bo
         backend, d, bodies, grid, options, measures_of_cell{},
         vp::framebuffer<Backend, number, number, number, vp::target<double, vp::blend::replace>, number, number, number,
                         vp::target<std::uint32_t, vp::blend::bit_xor>>{backend, grid.extent});
+}
+
+template <class Backend>
+void cell_faces(Backend& backend, digest& d, const std::vector<mesh_data>& bodies, const vp::grid& grid,
+                const vp::cell_options& options) {
+    using number = vp::target<float, vp::blend::replace>;
+    cell_values_into(backend, d, bodies, grid, options, faces_of_cell{},
+                     vp::framebuffer<Backend, number, number, number, number, number, number>{backend, grid.extent});
+}
+template <class Backend>
+void cell_lists(Backend& backend, digest& d, const std::vector<mesh_data>& bodies, const vp::grid& grid,
+                const vp::cell_options& options) {
+    std::vector<vp::mesh<Backend>> meshes;
+    for (const mesh_data& m : bodies) meshes.push_back(upload(backend, m));
+    std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, units_of_cell>> draws;
+    for (const auto& m : meshes) draws.push_back({m.view(), {}, {}});
+    vp::abuffer<Backend, std::int64_t> lists{backend};
+    add_counts(d, vp::voxelize_cells(backend, draws, grid, lists, options));
+    add_list(d, lists.to_host(backend));
 }
 
 // Bricks, with tiles where the shader ignores the voxel.
@@ -140,6 +173,19 @@ void add_cells(case_table<Backend>& cases) {
     add("closed.open", of("open"), odd_grid(), closed);
     vp::cell_options by_z = by_draws;
     by_z.axis = 2;
+    const auto list = [&](const std::string& name, const vp::grid& grid, const vp::cell_options& options) {
+        cases.push_back({"cells.lists.draws." + name,
+                         [=](Backend& backend, digest& d) { cell_lists(backend, d, shells(), grid, options); }});
+    };
+    list("shells", odd_grid(), by_draws);
+    list("axis.z.crop.shells", crop_of_odd_grid(), by_z);
+    const auto faces = [&](const std::string& name, const std::vector<mesh_data>& bodies, const vp::grid& grid,
+                           const vp::cell_options& options) {
+        cases.push_back({"cells.faces." + name,
+                         [=](Backend& backend, digest& d) { cell_faces(backend, d, bodies, grid, options); }});
+    };
+    for (const char* const mesh : {"torus", "soup"}) faces(mesh, of(mesh), odd_grid(), {});
+    faces("draws.axis.y.shells", shells(), odd_grid(), by_y);
     cases.push_back({"cells.sparse.shells", [](Backend& backend, digest& d) {
                          sparse_cell_values(backend, d, shells(), odd_grid(), {}, placeless_cell{});
                      }});
