@@ -95,6 +95,14 @@ listed = np.zeros(grid.shape, bool)
 listed[grid.zyx(cells.voxels)] = True
 show("sparse_fractions", blocks, grid, half(listed | (blocks > 0).any(axis=-1)))
 
+pair = [ring, torus((0.0, 0.0, 0.0), 0.62, 0.3)]
+mix = vp.fraction_lists(pair, coarse)
+share = np.zeros((*coarse.shape, 2))
+entries = np.repeat(mix.voxels, np.diff(mix.offsets), axis=0)
+share[(*coarse.zyx(entries), mix.bodies)] = mix.fractions
+blend = share @ np.array([[222, 160, 58], [62, 124, 178]]) / np.maximum(share.sum(axis=-1, keepdims=True), 1e-6)
+show("fraction_lists", np.uint8(np.rint(blend)), coarse, half(share.sum(axis=-1) > 0.5))
+
 links = [torus((2.0 * i, 0.0, 0.0), 0.7, 0.22) for i in range(3)]
 chain = vp.fit(links, 2 * size)
 labels = vp.label(vp.solid(links, chain))

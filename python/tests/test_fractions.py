@@ -103,6 +103,33 @@ def test_faces_of_crops_and_bodies_and_the_last_faces():
     assert np.array_equal(alone, whole["aperture_y"])
 
 
+def test_face_centroids_of_a_box_are_those_of_its_overlaps():
+    low, high = (0.625, 0.375, 1.25), (3.875, 3.0625, 6.5)
+    names = [f"{what}_{axis}" for what in ("aperture", "face_centroid") for axis in "xyz"]
+    for where in (GRID, GRID.crop((1, 1, 1), (4, 9, 3))):
+        cells = vp.fractions(box(low, high), where, of=names)
+        together = vp.fractions(box(low, high), where, of=[*names, "centroid", "area"])
+        for axis in range(3):
+            faces, middles = cells[names[axis]], cells[names[3 + axis]]
+            assert middles.dtype == np.float32 and middles.shape == (*faces.shape, 3)
+            assert np.array_equal(middles, together[names[3 + axis]])
+            expected = np.zeros(middles.shape)
+            for other in range(3):
+                first = where.origin[other] + where.voxel_size[other] * np.arange(faces.shape[2 - other])
+                begin = np.maximum(first, low[other])
+                end = np.minimum(first + where.voxel_size[other], high[other])
+                offset = ((begin + end) / 2 - first) / where.voxel_size[other] - 0.5
+                shape = [-1 if a == 2 - other else 1 for a in range(3)]
+                if other != axis:
+                    expected[..., other] = offset.reshape(shape)
+            expected[faces == 0] = 0
+            assert np.abs(middles - expected).max() < 1e-6 and np.abs(middles).max() > 0.1
+    each = vp.fractions([box(low, high), sphere()], GRID, of="face_centroid_z", bodies="each")
+    assert each.shape == (2, 15, 20, 9, 3) and np.array_equal(
+        each[0], vp.fractions(box(low, high), GRID, of="face_centroid_z")
+    )
+
+
 def test_area_of_a_sphere():
     mesh = sphere()
     grid = vp.fit(mesh, 20)
@@ -255,6 +282,43 @@ def test_lists_of_bodies_and_of_open_and_empty_meshes():
     none = vp.sparse_fractions((np.zeros((0, 3)), np.zeros((0, 3), int)), GRID, of=("area", "area_centroid"))
     assert none.voxels.shape == (0, 3) and none.cubes.shape == (0, 4)
     assert none.values["area"].shape == (0,) and none.cube_values["area_centroid"].shape == (0, 3)
+
+
+def test_lists_by_voxel_are_the_fractions_of_each_body():
+    a, b, c = box((0.5, 0.25, 1), (3.25, 3, 5)), box((2.5, 1, 2), (6, 4, 8)), sphere()
+    for where in (GRID, GRID.crop((1, 3, 2), (9, 12, 6))):
+        status, expected = {}, {}
+        lists = vp.fraction_lists([a, b, c], where, status=status)
+        dense = vp.fractions([a, b, c], where, bodies="each", status=expected)
+        assert isinstance(lists, vp.FractionLists) and type(lists.voxels) is vp.VoxelList
+        assert lists.offsets.dtype == np.int64 and lists.bodies.dtype == np.int32
+        found = np.zeros_like(dense)
+        entries = np.repeat(lists.voxels, np.diff(lists.offsets), axis=0)
+        found[(lists.bodies, *where.zyx(entries))] = lists.fractions
+        assert found.tobytes() == dense.tobytes()
+        numbers = np.ravel_multi_index(where.zyx(lists.voxels), where.shape)
+        assert (np.diff(numbers) > 0).all()  # z-major, each once
+        first = np.isin(np.arange(len(lists.bodies)), lists.offsets)
+        assert (first[1:] | (np.diff(lists.bodies) > 0)).all() and np.diff(lists.offsets).max() > 1
+        assert status["voxels"] == len(lists.voxels) and status["fragments"] == len(lists.bodies)
+        assert [status[n] for n in ("cut_voxels", "below_zero")] == [expected[n] for n in ("cut_voxels", "below_zero")]
+        alone = vp.fraction_lists([a, b, c], where, threads=1)
+        assert all(x.tobytes() == y.tobytes() for x, y in zip(alone, lists))
+    vertices, triangles = a
+    open_box, status = (vertices, np.delete(triangles, 8, axis=0)), {}
+    with pytest.warns(vp.OpenMeshWarning, match=r" of 560 rows"):
+        vp.fraction_lists([b, open_box], GRID, status=status)
+    assert status["open_edges"] == 3
+    closed = vp.fraction_lists([b, open_box], GRID, repair="close_holes", status=status)
+    assert status["open_edges"] == 0 and status["cones"] == 1 and set(closed.bodies) == {0, 1}
+    none = vp.fraction_lists((np.zeros((0, 3)), np.zeros((0, 3), int)), GRID)
+    assert none.voxels.shape == (0, 3) and none.offsets.tolist() == [0] and none.fractions.shape == (0,)
+    with pytest.raises(ValueError, match="repair"):
+        vp.fraction_lists(a, GRID, repair="vote")
+    with pytest.raises(TypeError, match=r"fraction_lists\(mesh, fit\(mesh, 64\)\)"):
+        vp.fraction_lists(a, 64)
+    with pytest.raises(IndexError):
+        vp.fraction_lists((vertices, [(0, 1, 99)]), GRID)
 
 
 def test_lists_of_a_grid_that_does_not_fit_densely():

@@ -25,7 +25,7 @@ from ._bake import bake, sparse
 from ._core import Grid
 from ._distance import distance, distance_at
 from ._fit import fit
-from ._fractions import SparseFractions, fractions, sparse_fractions
+from ._fractions import FractionLists, SparseFractions, fraction_lists, fractions, sparse_fractions
 from ._label import label
 from ._links import Links, links
 from ._model import Material, Model, ModelWarning, Part, Texture, load_model
@@ -44,6 +44,7 @@ except _PackageNotFoundError:  # the folder alone, not installed
 
 __all__ = [
     "DroppedTrianglesWarning",
+    "FractionLists",
     "Fragments",
     "Grid",
     "Hits",
@@ -66,6 +67,7 @@ __all__ = [
     "extract",
     "fit",
     "formats",
+    "fraction_lists",
     "fractions",
     "fragments",
     "instances",

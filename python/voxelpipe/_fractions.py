@@ -24,6 +24,7 @@ from ._types import (
 )
 
 _APERTURES = ("aperture_x", "aperture_y", "aperture_z")
+_FACE_CENTROIDS = ("face_centroid_x", "face_centroid_y", "face_centroid_z")
 # What is measured within a voxel, in the order of the call: the type and the shape of a voxel's values.
 _WITHIN: dict[str, tuple[Any, tuple[int, ...]]] = {
     "centroid": (np.float32, (3,)),
@@ -117,6 +118,9 @@ def fractions(
             "fraction": float32, (nz, ny, nx).
             "aperture_x", "aperture_y", "aperture_z": float64, how much of every face between two voxels along the axis is
             inside, with the grid's own two faces: (nz, ny, nx + 1), (nz, ny + 1, nx) and (nz + 1, ny, nx).
+            "face_centroid_x", "face_centroid_y", "face_centroid_z": float32, the centroids (x, y, z) of these faces' parts
+            inside, from the face's centre in voxels, -0.5 to 0.5, and 0 along the axis: the apertures' shapes with 3 more.
+            0 where the aperture is less than 2^-20, or overlapping parts put it out of the face.
             "area_vector": float64, (nz, ny, nx, 3), the sum of the vectors (x, y, z) of the mesh's area within the voxel,
             outward, in world units. For voxels of size 1 it is the difference of the voxel's two apertures along each axis,
             to the last bit; area between two voxels is the lower one's.
@@ -153,15 +157,17 @@ def fractions(
     parts = _parts(m, bodies)
     has_areas = "area_vector" in wanted
     # Rows along x come last: the fractions and the counters are theirs.
-    axes = [axis for axis in (2, 1) if has_areas or _APERTURES[axis] in wanted] + [0]
+    axes = [a for a in (2, 1) if has_areas or _APERTURES[a] in wanted or _FACE_CENTROIDS[a] in wanted] + [0]
     out: dict[str, np.ndarray] = {"fraction": np.empty((len(parts), *grid.shape), np.float32)}
     if has_areas:
         out["area_vector"] = np.zeros((len(parts), *grid.shape, 3))
-    for axis, faces in enumerate(_APERTURES):
+    for axis, (faces, middles) in enumerate(zip(_APERTURES, _FACE_CENTROIDS)):
+        shape = list(grid.shape)
+        shape[2 - axis] += 1
         if faces in wanted:
-            shape = list(grid.shape)
-            shape[2 - axis] += 1
             out[faces] = np.zeros((len(parts), *shape))
+        if middles in wanted:
+            out[middles] = np.zeros((len(parts), *shape, 3), np.float32)
     for part, (scalar, tail) in _WITHIN.items():
         if part in wanted:
             out[part] = np.zeros((len(parts), *grid.shape, *tail), scalar)
@@ -178,6 +184,7 @@ def fractions(
                 out["fraction"][body],
                 out[_APERTURES[axis]][body] if _APERTURES[axis] in out else None,
                 out["area_vector"][body] if has_areas else None,
+                out[_FACE_CENTROIDS[axis]][body] if _FACE_CENTROIDS[axis] in out else None,
                 within[0],
                 within[1],
                 within[2],
@@ -297,3 +304,57 @@ def sparse_fractions(
     take_counts(counts, status)
     _warn_if_open(counts, len(results) * grid.shape[0] * grid.shape[1])
     return results if bodies == "each" else results[0]
+
+
+class FractionLists(NamedTuple):
+    """How much of each voxel every body has: lists by voxel. Entries of voxels[i] are [offsets[i], offsets[i + 1]) of
+    `bodies` and `fractions`, by ascending body."""
+
+    voxels: Any
+    """(n, 3) int32, a VoxelList: x, y, z of each voxel that a body cuts or has inside, z-major order"""
+    offsets: Any
+    """(n + 1,) int64"""
+    bodies: Any
+    """(m,) int32: numbers of the bodies, in the order of the list of meshes or of the model's parts"""
+    fractions: Any
+    """(m,) float32: how much of the voxel is inside that body, 0 where a side alone lies in the voxel's upper faces"""
+
+
+def fraction_lists(
+    mesh: MeshLike,
+    grid: Grid,
+    *,
+    repair: HoleRepair = "none",
+    max_hole_edges: int | None = None,
+    threads: int = 0,
+    status: dict[str, int] | None = None,
+) -> FractionLists:
+    """Which bodies share each voxel, and how much of it every one has: the values of fractions(bodies="each"), bit for bit,
+    in memory in proportion to what the bodies fill, whatever their number. For materials given by percentages.
+
+    Args:
+        mesh, grid: as in voxelize(). The meshes of a list, and the parts of a model, are bodies.
+        repair, max_hole_edges, threads: as in fractions(); holes are those of each body.
+        status: as in fractions(), of one call for all bodies: `voxels` are those that are listed, `fragments` the entries.
+
+    Returns:
+        FractionLists, whose arrays are tensors for a mesh of tensors.
+
+    Warns and raises as fractions() does. Raises MemoryError where the lists do not fit.
+
+    Example:
+        >>> lists = vp.fraction_lists([hull, engine, cargo], grid)
+        >>> mixed = np.diff(lists.offsets) > 1  # voxels that bodies share
+        >>> parts = np.split(lists.fractions, lists.offsets[1:-1])  # of every voxel
+        >>> volumes = np.bincount(lists.bodies, lists.fractions) * np.prod(grid.voxel_size)
+    """
+    _checked("fraction_lists", grid, "fraction", CellValue, "each", repair, max_hole_edges, threads, status)
+    m = _host_mesh(mesh, "fractions")
+    positions, where = m.positions(grid)
+    voxels, offsets, bodies, fractions_of, counts = _core.fraction_lists(
+        positions, m.triangles, list(m.first_triangles), where, repair == "close_holes", max_hole_edges, threads
+    )
+    take_counts(counts, status)
+    _warn_if_open(counts, len(m.first_triangles) * grid.shape[0] * grid.shape[1])
+    rows = (offsets, bodies.view(np.int32), fractions_of)
+    return FractionLists(listed_for(m, voxels), *(m.to_caller(a) for a in rows))
