@@ -144,6 +144,101 @@ TEST(CellSlabs, OfBricksAreMergedToTheWhole) {
     EXPECT_TRUE(vp::same_contents(vp::merge(std::span<const host>(parts)), whole.to_host(backend)));
 }
 
+// A-buffers of slabs follow each other as the lists of one call.
+TEST(CellSlabs, OfListsAreTheListsOfOneCall) {
+    const vp::grid g = solids::unit_grid({15, 14, 16}).crop({1, 0, 2}, {13, 14, 13});
+    mesh m = solids::sphere({7.2F, 7.5F, 8.1F}, 6.25F, 2);
+    m.triangles.erase(m.triangles.begin() + 4);
+    const vp::cell_options how{.count_open_edges = false, .repair = vp::repair::close_holes};
+    vp::cpu_backend backend(2);
+    vp::abuffer<vp::cpu_backend, float> lists(backend);
+    const vp::status expected = vp::voxelize_cells(backend, m.view(), g, vp::passthrough{}, vp::fraction{}, lists, how);
+    ASSERT_TRUE(expected.ok()) << expected.message();
+    slabs::stream stream(backend, g, vp::passthrough{}, {.num_slabs = 5, .repair = vp::repair::close_holes});
+    ASSERT_TRUE(stream.add(m.view()).ok());
+    vp::host_abuffer<float> all;
+    std::size_t num_slabs = 0;
+    const vp::status s = stream.draw_cells(
+        vp::fraction{}, [&](glm::ivec3) { return vp::abuffer<vp::cpu_backend, float>{backend}; },
+        [&](const slabs::slab& part, const vp::abuffer<vp::cpu_backend, float>& out) {
+            EXPECT_EQ(part.voxels_before, all.voxels.size());
+            slabs::append(all, g, part, out.to_host(backend));
+            ++num_slabs;
+        },
+        how);
+    ASSERT_TRUE(s.ok()) << s.message();
+    EXPECT_GE(num_slabs, 5u);
+    EXPECT_EQ(s.counts, expected.counts);
+    EXPECT_EQ(s.cells, expected.cells);
+    const auto whole = lists.to_host(backend);
+    EXPECT_GT(whole.voxels.size(), 500u);
+    EXPECT_EQ(all.voxels, whole.voxels);
+    EXPECT_EQ(all.offsets, whole.offsets);
+    EXPECT_EQ(all.primitives, whole.primitives);
+    EXPECT_EQ(all.payloads, whole.payloads);
+}
+
+// Links, whose triangles may lie half a voxel beyond a slab: the records of one call, layer by layer.
+TEST(CellSlabs, OfLinksAreTheRecordsOfOneCall) {
+    splitmix64 random(59);
+    for (int round = 0; round < 6; ++round) {
+        const mesh m = solids::random_bodies(random, 12, 5); // faces in the planes of voxels' centres and between slabs
+        const vp::grid whole = solids::unit_grid({11, 12, 13}),
+                       g = round % 2 == 0 ? whole : whole.crop({1, 2, 1}, {7, 6, 11});
+        const vp::link_options how{.neighbours = round % 3 == 0 ? 26 : 18};
+        vp::cpu_backend backend(2);
+        vp::link_list<vp::cpu_backend> links(backend);
+        const vp::status expected = vp::voxelize_links(backend, m.view(), g, vp::passthrough{}, links, how);
+        ASSERT_TRUE(expected.ok()) << expected.message();
+        EXPECT_GT(expected.counts.voxels, 50u);
+        for (const int num_slabs : {1, 4, 11}) {
+            slabs::stream stream(backend, g, vp::passthrough{}, {.num_slabs = num_slabs, .is_links = true});
+            for (std::size_t first = 0; first < m.triangles.size(); first += 7) {
+                const std::size_t count = std::min<std::size_t>(7, m.triangles.size() - first);
+                ASSERT_TRUE(stream.add(vp::mesh_view<>{m.positions, {m.triangles.data() + first, count}}).ok());
+            }
+            std::vector<glm::ivec3> voxels;
+            std::vector<float> q;
+            std::vector<std::uint32_t> primitives, draws;
+            const auto append = [&](auto& to, const auto& from) {
+                const auto values = from.to_host(backend);
+                to.insert(to.end(), values.begin(), values.end());
+            };
+            const vp::status s = stream.draw_links(
+                [&](const slabs::slab& part, const vp::link_list<vp::cpu_backend>& of_slab) {
+                    EXPECT_EQ(part.voxels_before, voxels.size());
+                    for (const glm::ivec3& p : of_slab.voxels.to_host(backend))
+                        voxels.push_back(p + part.where.offset - g.offset);
+                    append(q, of_slab.q);
+                    append(primitives, of_slab.primitives);
+                    append(draws, of_slab.draws);
+                },
+                how);
+            ASSERT_TRUE(s.ok()) << s.message();
+            EXPECT_EQ(s.counts, expected.counts);
+            EXPECT_EQ(voxels, links.voxels.to_host(backend));
+            EXPECT_EQ(q, links.q.to_host(backend));
+            EXPECT_EQ(primitives, links.primitives.to_host(backend));
+            EXPECT_EQ(draws, links.draws.to_host(backend));
+        }
+    }
+    const mesh m = solids::box(glm::vec3(1.25F), glm::vec3(4.5F));
+    vp::cpu_backend backend(1);
+    const vp::grid g = solids::unit_grid(glm::ivec3(6));
+    const auto ignore = [](const slabs::slab&, const vp::link_list<vp::cpu_backend>&) {};
+    const auto code = [&](const slabs::stream_options& options, int neighbours) {
+        slabs::stream stream(backend, g, vp::passthrough{}, options);
+        EXPECT_TRUE(stream.add(m.view()).ok());
+        return stream.draw_links(ignore, {.neighbours = neighbours}).code;
+    };
+    EXPECT_EQ(code({.is_links = true}, 18), vp::status_code::ok);
+    EXPECT_EQ(code({.is_links = true}, 19), vp::status_code::bad_cell_options);
+    EXPECT_EQ(code({}, 18), vp::status_code::bad_cell_options);
+    EXPECT_EQ(code({.is_solid = true, .is_links = true}, 18), vp::status_code::bad_cell_options);
+    EXPECT_EQ(stream_cells(m, g, {}, {.is_solid = true, .is_links = true}).status.code,
+              vp::status_code::bad_cell_options);
+}
+
 TEST(CellSlabs, RefuseWhatTheyCannot) {
     const mesh m = solids::box(glm::vec3(1.25F), glm::vec3(4.5F));
     const vp::grid g = solids::unit_grid(glm::ivec3(6));

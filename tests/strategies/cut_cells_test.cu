@@ -428,6 +428,38 @@ TEST(DeviceLinks, HaveTheBytesOfTheCpu) {
     EXPECT_EQ(expect_same_links({}, flat, 18), 0u);
 }
 
+// Slabs of a stream on the device: the cpu's records of the whole, with the whole's primitives.
+TEST(DeviceLinks, SlabsOfAStreamAreTheWhole) {
+    namespace slabs = vp::slabs;
+    const glm::ivec3 extent{14, 17, 15};
+    mesh_data m = device_test::ball({7, 8, 7}, 5.3f, 7);
+    device_test::append(m, device_test::long_triangles(extent, 5, 3));
+    const vp::grid g = device_test::box_grid(extent).crop({1, 2, 1}, {12, 14, 13});
+    vp::cpu_backend cpu;
+    vp::cuda_backend gpu;
+    vp::link_list<vp::cpu_backend> whole(cpu);
+    const vp::mesh_view<> view{m.positions, m.triangles};
+    const vp::status expected = vp::voxelize_links(cpu, view, g, vp::passthrough{}, whole);
+    ASSERT_TRUE(expected.ok()) << expected.message();
+    slabs::stream stream(gpu, g, vp::passthrough{}, {.num_slabs = 4, .is_links = true});
+    ASSERT_TRUE(stream.add(view).ok());
+    std::vector<glm::ivec3> voxels;
+    std::vector<float> q;
+    std::vector<std::uint32_t> primitives;
+    const vp::status s =
+        stream.draw_links([&](const slabs::slab& part, const vp::link_list<vp::cuda_backend>& of_slab) {
+            for (const glm::ivec3& p : of_slab.voxels.to_host(gpu)) voxels.push_back(p + part.where.offset - g.offset);
+            for (const float f : of_slab.q.to_host(gpu)) q.push_back(f);
+            for (const std::uint32_t p : of_slab.primitives.to_host(gpu)) primitives.push_back(p);
+        });
+    ASSERT_TRUE(s.ok()) << s.message();
+    EXPECT_EQ(s.counts, expected.counts);
+    EXPECT_GT(voxels.size(), 100u);
+    device_test::expect_same_bytes(whole.voxels.to_host(cpu), voxels, "voxels");
+    device_test::expect_same_bytes(whole.q.to_host(cpu), q, "q");
+    device_test::expect_same_bytes(whole.primitives.to_host(cpu), primitives, "primitives");
+}
+
 TEST(DeviceCells, NothingAndBadIndices) {
     vp::cuda_backend gpu;
     const vp::grid g = device_test::box_grid(glm::ivec3(5));

@@ -314,6 +314,33 @@ struct classified {
     return t;
 }
 
+// Classifies a triangle as voxelize_links does. Its reach are the voxels whose links may meet its box: they end half a
+// voxel beyond them.
+[[nodiscard]] VOXELPIPE_HD inline classified classify_for_links(const core::snap_transform& snap,
+                                                                const glm::ivec3& extent, const glm::vec3& a,
+                                                                const glm::vec3& b, const glm::vec3& c) {
+    const auto snapped = [&](const glm::vec3& p) { return core::snap(snap, p.x, p.y, p.z); };
+    const core::snapped_position p = snapped(a), q = snapped(b), r = snapped(c);
+    classified t;
+    t.kind = core::classify_positions(p, q, r);
+    t.reach = {{{0, 0, 0}}, {{-1, -1, -1}}};
+    if (t.kind != core::triangle_class::drawn) return t;
+    const std::int64_t half = std::int64_t{1} << (snap.fraction - 1);
+    const std::int64_t at[3][3] = {{p.x, q.x, r.x}, {p.y, q.y, r.y}, {p.z, q.z, r.z}};
+    core::voxel_box whole{}, reach{};
+    for (int k = 0; k < 3; ++k) {
+        const std::int64_t low = core::min3(at[k][0], at[k][1], at[k][2]),
+                           high = core::max3(at[k][0], at[k][1], at[k][2]);
+        whole.lo[k] = 0;
+        whole.hi[k] = extent[k] - 1;
+        reach.lo[k] = -((3 * half - low) >> snap.fraction); // the least voxel whose links end at or beyond `low`
+        reach.hi[k] = (high + half) >> snap.fraction;
+    }
+    t.reach = core::intersect(reach, whole);
+    if (t.reach.empty()) t.kind = core::triangle_class::outside;
+    return t;
+}
+
 // The status of the whole: what was drawn in all slabs, added up, and the counts of the triangles of the whole.
 [[nodiscard]] inline status with_triangles(status all, const counters& triangles) {
     const counters drawn = all.counts;

@@ -6,6 +6,7 @@
 // shader gave them, and its number in the whole mesh. Records are made of meshes in host memory, and become the mesh of
 // a slab.
 
+#include <voxelpipe/cells/links.hpp>
 #include <voxelpipe/core/threads.hpp>
 #include <voxelpipe/distance/distance.hpp>
 #include <voxelpipe/slabs/plan.hpp>
@@ -84,6 +85,14 @@ struct renumber_list {
     const std::uint32_t* numbers;
     VOXELPIPE_HD void operator()(std::uint64_t i) const { primitives[i] = numbers[primitives[i]]; }
 };
+// Likewise the links of a slab, most of which name no primitive.
+struct renumber_links {
+    std::uint32_t* primitives;
+    const std::uint32_t* numbers;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (primitives[i] != no_crossing) primitives[i] = numbers[primitives[i]];
+    }
+};
 
 } // namespace detail
 
@@ -93,11 +102,13 @@ struct binning {
     bool is_solid = false;                              // for voxelize_solid
     voxelpipe::repair repair = voxelpipe::repair::none; // of solids
     glm::ivec3 halo = glm::ivec3(-1);                   // for voxelize_distance: core::band_halo; below 0: another call
+    bool is_links = false;                              // for voxelize_links
 
     // As classify(), for a triangle's three corners. `drawn` with an empty reach: counted as drawn, but no slab needs
     // it.
     [[nodiscard]] VOXELPIPE_HD classified operator()(const core::snap_transform& snap, const glm::ivec3& extent,
                                                      const glm::vec3 (&at)[3]) const {
+        if (is_links) return classify_for_links(snap, extent, at[0], at[1], at[2]);
         if (is_distance()) return classify_for_distance(snap, extent, halo, at[0], at[1], at[2]);
         if (is_solid && repair == repair::vote) return classify_for_vote(snap, extent, at[0], at[1], at[2]);
         if (is_solid && repair == repair::exterior) // a cover is all that counts

@@ -5,6 +5,7 @@
 // The records of a slab as the arrays of a mesh in host memory, and what is known of that into which a slab is drawn.
 
 #include <voxelpipe/abuffer.hpp>
+#include <voxelpipe/cells/links.hpp>
 #include <voxelpipe/core/threads.hpp>
 #include <voxelpipe/framebuffer.hpp>
 #include <voxelpipe/slabs/bins.hpp>
@@ -40,6 +41,10 @@ template <class Output>
 inline constexpr bool is_abuffer = false;
 template <class Backend, class Payload>
 inline constexpr bool is_abuffer<abuffer<Backend, Payload>> = true;
+template <class Output>
+inline constexpr bool is_links = false;
+template <class Backend>
+inline constexpr bool is_links<link_list<Backend>> = true;
 
 // Three vertices a triangle.
 template <class Varyings>

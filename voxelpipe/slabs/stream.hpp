@@ -24,6 +24,7 @@
 #include <voxelpipe/slabs/slab_arrays.hpp>
 #include <voxelpipe/slabs/slab_lists.hpp>
 #include <voxelpipe/slabs/slab_queue.hpp>
+#include <voxelpipe/slabs/slab_sink.hpp>
 #include <voxelpipe/slabs/stream_options.hpp>
 #include <voxelpipe/solid/solid.hpp>
 #include <voxelpipe/sparse/sparse.hpp>
@@ -31,9 +32,7 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <exception>
 #include <memory>
-#include <new>
 #include <stdexcept>
 #include <thread>
 #include <type_traits>
@@ -115,17 +114,18 @@ public:
     // whose triangles and targets exceed the budget, or whose call runs out of memory, is cut again: along z, then y,
     // then x; A-buffers along z alone. Returns the counts of the whole, or the failure of a call; what earlier slabs
     // gave has reached the sink by then. bad_solid_options: the triangles were binned for solids, which count others as
-    // drawn; bad_distance_options: for distances. Throws what sink throws, what make throws other than std::bad_alloc,
-    // which cuts the slab, and std::system_error of files.
+    // drawn; bad_distance_options: for distances; bad_cell_options: for links. Throws what sink throws, what make
+    // throws other than std::bad_alloc, which cuts the slab, and std::system_error of files.
     template <class FragmentShader, class Make, class Sink>
     [[nodiscard]] status draw(const FragmentShader& shader, const Make& make, const Sink& sink) {
         if (options_.band) return core::failure(status_code::bad_distance_options);
         if (options_.is_solid) return core::failure(status_code::bad_solid_options);
+        if (options_.is_links) return core::failure(status_code::bad_cell_options);
         const auto call = [&](const auto& draws, const grid& g, auto& out) {
             return voxelize(backend_, draws, g, out, options_.voxelize);
         };
-        return with_sink(sink,
-                         [&](const auto& to) { return draw_slabs<kinds::surface>(shader, make, to, 0.75, call); });
+        return detail::with_sink(
+            sink, [&](const auto& to) { return draw_slabs<kinds::surface>(shader, make, to, 0.75, call); });
     }
     // Draws solids: the voxels, the counts and the counts of rows of one call with the whole mesh, which is one draw.
     // Slabs are along y or z, with vote and exterior along z. how.repair is that of stream_options; how.cones and
@@ -139,14 +139,14 @@ public:
     template <class SolidShader, class Make, class Sink>
     [[nodiscard]] status draw_solid(const SolidShader& shader, const Make& make, const Sink& sink,
                                     const solid_options& how = {}) {
-        if (!options_.is_solid || options_.band || how.repair != options_.repair || how.slab != nullptr ||
-            how.cones != nullptr || axis_ == 0 || (repairs_.is_along_z() && axis_ != 2))
+        if (!options_.is_solid || options_.is_links || options_.band || how.repair != options_.repair ||
+            how.slab != nullptr || how.cones != nullptr || axis_ == 0 || (repairs_.is_along_z() && axis_ != 2))
             return core::failure(status_code::bad_solid_options);
         if (!has_walls_)
             if (const status s = core::validate(how, grid_); !s.ok()) return s;
         if (repairs_.is_along_z() && !core::takes_solid_slabs<Backend>)
             return core::failure(status_code::strategy_unavailable);
-        return with_sink(sink, [&](const auto& to) {
+        return detail::with_sink(sink, [&](const auto& to) {
             if (!has_walls_)
                 if (const status s = repairs_.begin(how); !s.ok()) return s;
             const auto call = [&](const auto& draws, const grid& g, auto& out) {
@@ -157,17 +157,18 @@ public:
     }
     // Draws cut cells: the fractions, and the counts but for open_edges, of one voxelize_cells with the whole mesh,
     // which is one draw. The stream is made for solids (stream_options::is_solid), with how.repair as its repair;
-    // make gives framebuffers or sparse framebuffers. Rows run along x (how.axis is 0), and slabs are along y or z.
-    // how.cones are found by the stream, and not given. Memory beyond the targets, which the budget does not count: as
-    // for voxelize_cells, of a slab's triangles. bad_cell_options: another stream or option.
+    // make gives framebuffers, sparse framebuffers or A-buffers. Rows run along x (how.axis is 0), and slabs are along
+    // y or z, those of A-buffers along z. how.cones are found by the stream, and not given. Memory beyond the targets,
+    // which the budget does not count: as for voxelize_cells, of a slab's triangles. bad_cell_options: another stream
+    // or option.
     template <class CellShader, class Make, class Sink>
     [[nodiscard]] status draw_cells(const CellShader& shader, const Make& make, const Sink& sink,
                                     const cell_options& how = {}) {
         if (const status s = core::validate(how); !s.ok()) return s;
-        if (!options_.is_solid || options_.band || how.repair != options_.repair || how.cones != nullptr ||
-            how.axis != 0 || axis_ == 0)
+        if (!options_.is_solid || options_.is_links || options_.band || how.repair != options_.repair ||
+            how.cones != nullptr || how.axis != 0 || axis_ == 0)
             return core::failure(status_code::bad_cell_options);
-        return with_sink(sink, [&](const auto& to) {
+        return detail::with_sink(sink, [&](const auto& to) {
             solid_options holes;
             holes.repair = how.repair;
             holes.max_hole_edges = how.max_hole_edges;
@@ -183,6 +184,23 @@ public:
             return all;
         });
     }
+    // Lists links: the records and the counts of one voxelize_links with the whole mesh, which is one draw. The stream
+    // is made for links alone (stream_options::is_links), with slabs along z: their lists follow each other. sink(const
+    // slab&, link_list<Backend>&) gets those of a slab, whose voxels count from the slab's corner, and whose primitives
+    // are numbers of the whole mesh. Memory beyond the lists, which the budget does not count: as for voxelize_links,
+    // of a slab's triangles. bad_cell_options: another stream or option; bad_crop: slabs along another axis.
+    template <class Sink>
+    [[nodiscard]] status draw_links(const Sink& sink, const link_options& how = {}) {
+        if (const status s = core::validate(how); !s.ok()) return s;
+        if (!options_.is_links || options_.is_solid || options_.band)
+            return core::failure(status_code::bad_cell_options);
+        const auto make = [&](const glm::ivec3&) { return link_list<Backend>(backend_); };
+        const auto call = [&](const auto& draws, const grid& g, auto& out) {
+            return voxelize_links(backend_, draws, g, out, how);
+        };
+        return detail::with_sink(
+            sink, [&](const auto& to) { return draw_slabs<kinds::links>(none{}, make, to, 0.75, call); });
+    }
     // Draws distances: the bytes and the counts of one voxelize_distance with the whole mesh, which is one draw. The
     // stream is made for how.band (stream_options::band), with how.repair as its repair: none, close_holes or winding.
     // make gives framebuffers or sparse framebuffers. Slabs are along y or z, samples are centres, and a slab has the
@@ -193,10 +211,10 @@ public:
     [[nodiscard]] status draw_distance(const DistanceShader& shader, const Make& make, const Sink& sink,
                                        const distance_options& how = {}) {
         if (const status s = core::validate(how, grid_); !s.ok()) return s;
-        if (options_.band != how.band || how.repair != options_.repair || repairs_.is_along_z() ||
+        if (options_.is_links || options_.band != how.band || how.repair != options_.repair || repairs_.is_along_z() ||
             how.cones != nullptr || how.sample != sample::centre || axis_ == 0)
             return core::failure(status_code::bad_distance_options);
-        return with_sink(sink, [&](const auto& to) {
+        return detail::with_sink(sink, [&](const auto& to) {
             const solid_options holes = core::sign_options(how);
             if (const status s = repairs_.begin(holes); !s.ok()) return s;
             return draw_slabs<kinds::distance>(shader, make, to, 0.75,
@@ -209,8 +227,8 @@ public:
     }
 
 private:
-    enum class kinds { surface, solid, distance };      // of calls that draw a slab
-    static constexpr double share_beside_flood = 0.625; // of the memory, an eighth of which the flood has
+    enum class kinds { surface, solid, distance, links }; // of calls that draw a slab
+    static constexpr double share_beside_flood = 0.625;   // of the memory, an eighth of which the flood has
     using arrays = detail::slab_arrays<Varyings>;
     using queue_type = detail::slab_queue<Varyings>;
     using mesh_types = detail::slab_mesh<Varyings>;
@@ -220,34 +238,12 @@ private:
         return g;
     }
 
-    // Calls work(the sink, as one that returns true if it has thrown nothing). A shortage of memory is a status, but
-    // one of the sink is thrown: a slab that was cut for it would reach the sink twice.
-    template <class Sink, class Work>
-    [[nodiscard]] static status with_sink(const Sink& sink, const Work& work) {
-        std::exception_ptr thrown;
-        status result;
-        try {
-            result = work([&](const slab& part, auto& out) {
-                try {
-                    sink(part, out);
-                } catch (...) {
-                    thrown = std::current_exception();
-                }
-                return !thrown;
-            });
-        } catch (const std::bad_alloc&) {
-            result = core::failure(status_code::out_of_memory, stage::coarse_raster);
-        }
-        if (thrown) std::rethrow_exception(thrown);
-        return result;
-    }
-
     // share: of the memory, that a slab may take. call(draws, grid, output) draws a slab.
     template <kinds Kind, class Shader, class Make, class Sink, class Call>
     [[nodiscard]] status draw_slabs(const Shader& shader, const Make& make, const Sink& sink, double share,
                                     const Call& call) {
         using output = std::remove_cvref_t<decltype(make(grid_.extent))>;
-        const bool layers = detail::is_abuffer<output> || keeps_layers_;
+        const bool layers = detail::is_abuffer<output> || detail::is_links<output> || keeps_layers_;
         if (layers && axis_ != 2) return core::failure(status_code::bad_crop);
         if (!has_walls_) enqueue(layers || repairs_.is_along_z() ? 2 : Kind != kinds::surface ? 1 : 0);
         if constexpr (Kind != kinds::surface)
@@ -323,7 +319,8 @@ private:
                 return call(std::span<const draw_type>(&d, 1), g, out);
             };
             status s;
-            if constexpr (core::is_constant<Shader> || Kind == kinds::solid || std::is_same_v<Shader, distance>)
+            if constexpr (core::is_constant<Shader> || Kind == kinds::solid || Kind == kinds::links ||
+                          std::is_same_v<Shader, distance>)
                 s = one_draw(shader);
             else if constexpr (Kind == kinds::distance)
                 s = one_draw(detail::numbered_distance<Shader>{shader, numbers});
@@ -332,6 +329,9 @@ private:
             if constexpr (detail::is_abuffer<Output> && Kind == kinds::surface)
                 if (s.ok())
                     backend_.for_each(out.primitives.size(), detail::renumber_list{out.primitives.data(), numbers});
+            if constexpr (Kind == kinds::links)
+                if (s.ok())
+                    backend_.for_each(out.primitives.size(), detail::renumber_links{out.primitives.data(), numbers});
             return s;
         };
         if constexpr (requires { Backend::runs_on_host; }) {

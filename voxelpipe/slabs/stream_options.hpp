@@ -34,12 +34,13 @@ struct stream_options {
     voxelpipe::repair repair = voxelpipe::repair::none;
     // For draw_distance with this band, which decides what triangles a slab needs; that or the options above.
     std::optional<voxelpipe::band> band = std::nullopt;
-    unsigned threads = 0; // of the host, that shade, bin and read; 0: all cores. Results do not depend on it
+    bool is_links = false; // for draw_links: triangles up to half a voxel beside the grid count too; that alone
+    unsigned threads = 0;  // of the host, that shade, bin and read; 0: all cores. Results do not depend on it
 
     // As a triangle of a grid is binned.
     [[nodiscard]] slabs::binning binning(const grid& g) const {
         return {voxelize.rule, is_solid || repair != voxelpipe::repair::none, repair,
-                band ? core::band_halo(*band, g) : glm::ivec3(-1)};
+                band ? core::band_halo(*band, g) : glm::ivec3(-1), is_links};
     }
 };
 
