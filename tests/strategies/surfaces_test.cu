@@ -14,6 +14,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 using namespace surface_tests;
 
 namespace {
@@ -45,6 +47,29 @@ TEST(DeviceSurfaces, OfBitsHaveTheBytesOfTheCpu) {
             EXPECT_TRUE(a.has_same_arrays(b)) << k;
         }
     }
+}
+
+// Rows of more than 32 words, rows that end with a word, several blocks of words, and blocks with so many vertices that
+// they are not joined in shared memory; surfaces of one block and of none.
+TEST(DeviceSurfaces, OfBitsOfManyWordsHaveTheBytesOfTheCpu) {
+    vp::cuda_backend gpu;
+    vp::cpu_backend cpu;
+    std::mt19937 random(11);
+    std::uint64_t components = 0;
+    for (const auto& [extent, density] :
+         {std::pair{glm::ivec3(1100, 4, 5), 0.02}, std::pair{glm::ivec3(1024, 3, 4), 0.1},
+          std::pair{glm::ivec3(2049, 2, 1), 0.5}, std::pair{glm::ivec3(64, 20, 19), 0.5},
+          std::pair{glm::ivec3(96, 24, 17), 0.97}, std::pair{glm::ivec3(33, 9, 8), 0.0}}) {
+        const bit_volume v = random_volume(random, extent, density);
+        for (const vp::extract_options& o :
+             {vp::extract_options{}, vp::extract_options{.place = vp::place::sharp, .quads = true}}) {
+            const host_surface a = extract_bits(gpu, v, o), b = extract_bits(cpu, v, o);
+            EXPECT_TRUE(a.status.ok());
+            EXPECT_TRUE(a.has_same_arrays(b)) << extent.x;
+            components += a.status.surface.components;
+        }
+    }
+    EXPECT_GT(components, 500u);
 }
 
 TEST(DeviceSurfaces, OfFieldsHaveTheBytesOfTheCpu) {

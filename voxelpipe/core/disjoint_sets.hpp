@@ -40,13 +40,14 @@ struct disjoint_sets {
             v = up;
         }
     }
-    VOXELPIPE_HD void join(Number a, Number b) const {
+    // Returns whether that made one set of two, which it does for one of the threads that join the same two.
+    VOXELPIPE_HD bool join(Number a, Number b) const {
         for (;;) {
             a = root(a);
             b = root(b);
-            if (a == b) return;
+            if (a == b) return false;
             const Number high = a > b ? a : b, low = a > b ? b : a;
-            if (exchange(parents[high], high, low)) return;
+            if (exchange(parents[high], high, low)) return true;
         }
     }
     // The same while no other thread changes these sets.

@@ -47,10 +47,10 @@ template <class Backend, class T, class Blend, class Layout, class Finish>
             return finish(cells, nullptr, result);
         } else {
             typename Backend::template buffer<edge_crossing> crossings(backend, cells.num_edges());
-            backend.for_each(
-                cells.count(),
-                passes::cross_field<passes::cell_list, target_view<target<T, Blend, Layout>>>{
-                    cells.list(), from, options.level, crossings.data(), counts.data() + 1, counted.cells()});
+            for_each_edge<passes::all_axes>(
+                backend, cells,
+                passes::cross_field<target_view<target<T, Blend, Layout>>>{from, options.level, crossings.data(),
+                                                                           counts.data() + 1, counted.cells()});
             const std::vector<std::uint64_t> host = counts.to_host(backend);
             result.surface.nan_samples = host[0];
             result.surface.made_crossings = host[1];

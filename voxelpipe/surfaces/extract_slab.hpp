@@ -60,7 +60,9 @@ template <class Backend>
     using quads = typename Backend::template buffer<glm::uvec4>;
     typename Backend::template buffer<passes::layer_begin> ends(backend, 2);
     const passes::counted_layers own = own_layers(slab).cells();
-    backend.for_each(2, passes::find_layers{cells.list(), cells.count(), own.first, own.end - own.first, ends.data()});
+    using list_type = typename surface_cells<Backend>::list_type;
+    backend.for_each(2, passes::find_layers<list_type>{cells.list(), cells.count(), cells.grid(), own.first,
+                                                       own.end - own.first, ends.data()});
     const std::vector<passes::layer_begin> range = ends.to_host(backend);
     const std::uint64_t num_vertices = range[1].vertex - range[0].vertex, num_quads = range[1].edge - range[0].edge;
     if (slab.first_vertex + num_vertices > std::numeric_limits<std::uint32_t>::max())
@@ -71,9 +73,9 @@ template <class Backend>
     quads all_quads(backend, cells.num_edges());
     words all_sources(backend, has_sources ? cells.num_vertices() : 0);
     backend.for_each(cells.count(),
-                     passes::place_vertices<passes::cell_list>{cells.list(), options.place, crossings, all.data(),
-                                                               primitives, has_sources ? all_sources.data() : nullptr});
-    backend.for_each(cells.count(), passes::list_quads<passes::cell_list>{cells.list(), all_quads.data()});
+                     passes::place_vertices<list_type>{cells.list(), options.place, crossings, all.data(), primitives,
+                                                       has_sources ? all_sources.data() : nullptr});
+    backend.for_each(cells.count(), passes::list_quads<list_type>{cells.list(), all_quads.data()});
     surface<Backend> made(backend);
     made.samples = samples;
     made.vertices = vertices(backend, num_vertices);

@@ -79,9 +79,9 @@ template <class Backend, class... Field, class... Bits>
         typename Backend::template buffer<core::edge_crossing> crossings(backend, cells.num_edges());
         const auto view = from.view();
         const core::passes::sparse_field_view values{read.view(), get<0>(view.values), get<0>(view.clear_values)};
-        using list_type = typename core::sparse_cells<Backend>::list_type;
-        backend.for_each(cells.count(), core::passes::cross_field<list_type, core::passes::sparse_field_view>{
-                                            cells.list(), values, options.level, crossings.data(), counts.data() + 1});
+        core::for_each_edge<core::passes::all_axes>(backend, cells,
+                                                    core::passes::cross_field<core::passes::sparse_field_view>{
+                                                        values, options.level, crossings.data(), counts.data() + 1});
         const std::vector<std::uint64_t> host = counts.to_host(backend);
         status result;
         result.surface.nan_samples = host[0];

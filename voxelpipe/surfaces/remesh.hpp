@@ -114,13 +114,17 @@ void find_mesh_crossings(Backend& backend, const Cells& cells, const gathered_me
     list.triangles = found.data();
     backend.for_each(triangles.count, list);
     backend.sort_by_key(keys, found, rows.key_bits());
-    numbers first_of_row(backend, Cells::is_sparse ? 0 : rows.rows() + 1); // in bricks nothing has the grid's size
-    backend.for_each(first_of_row.size(), passes::find_rows{keys.data(), total, rows.bits, first_of_row.data()});
-    backend.for_each(cells.count(),
-                     passes::cross_mesh<Axis, typename Cells::list_type>{
-                         cells.list(), triangles, rows, Cells::is_sparse ? nullptr : first_of_row.data(), keys.data(),
-                         total, found.data(), crossing_rule(options), options.bodies == bodies::draw,
-                         samples.fraction(), crossings, counts, counted});
+    typename Backend::template buffer<passes::row_range> ranges(
+        backend, Cells::is_sparse ? 0 : rows.rows()); // in bricks nothing has the grid's size
+    if constexpr (!Cells::is_sparse) {
+        backend.for_each(rows.rows(), passes::clear_rows{ranges.data()});
+        backend.for_each(total, passes::find_rows{keys.data(), total, rows.rows(), rows.bits, ranges.data()});
+    }
+    for_each_edge<Axis>(backend, cells,
+                        passes::cross_mesh<Axis>{triangles, rows, Cells::is_sparse ? nullptr : ranges.data(),
+                                                 keys.data(), total, found.data(), crossing_rule(options),
+                                                 options.bodies == bodies::draw, samples.fraction(), crossings, counts,
+                                                 counted});
 }
 
 // What makes the surface of all cells: finish_surface.

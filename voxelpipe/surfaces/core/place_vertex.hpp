@@ -21,39 +21,34 @@ struct cell_place {
     return static_cast<std::uint16_t>(q < 1 ? 1 : q > 65535 ? 65535 : q);
 }
 
-// The crossings of one sheet: at most 7, in the order of their edges.
-class sheet_points {
-public:
-    static constexpr int most = 7;
+// A point in a cell in units of 2^-24.
+using crossing_point = triple<std::uint32_t>;
+// The crossing of the edge along `axis` whose lower corner of the cell is `corner`.
+[[nodiscard]] VOXELPIPE_HD inline crossing_point point_on_edge(int axis, int corner, std::uint32_t t) {
+    crossing_point p{};
+    for (int a = 0; a < 3; ++a)
+        p[a] = a == axis ? t : static_cast<std::uint32_t>(corner >> a & 1) << edge_crossing::fraction;
+    return p;
+}
 
-    // A crossing of the edge along `axis` whose lower corner of the cell is `corner`.
-    VOXELPIPE_HD void add(int axis, int corner, const edge_crossing& c) {
-        triple<std::uint32_t> p{};
-        for (int a = 0; a < 3; ++a) {
-            p[a] = a == axis ? c.t : static_cast<std::uint32_t>(corner >> a & 1) << edge_crossing::fraction;
-            sum_[a] += p[a];
-        }
-        points_[count_] = p;
-        normals_[count_] = {{c.nx, c.ny, c.nz}};
+// The mean of the crossings of one sheet.
+class sheet_mean {
+public:
+    VOXELPIPE_HD void add(const crossing_point& p) {
+        for (int a = 0; a < 3; ++a) sum_[a] += p[a];
         ++count_;
     }
-
-    // The mean of the crossings, rounded half up.
-    [[nodiscard]] VOXELPIPE_HD cell_place mean() const {
+    // Rounded half up.
+    [[nodiscard]] VOXELPIPE_HD cell_place place() const {
         cell_place r{};
         const auto unit = static_cast<std::uint64_t>(count_) << (edge_crossing::fraction - 16);
         for (int a = 0; a < 3; ++a) r.q[a] = inner_place(static_cast<std::int64_t>((2 * sum_[a] + unit) / (2 * unit)));
         return r;
     }
-
-    // The point x that minimizes sum (n . (x - p))^2 + 2^-10 m |x - mean|^2 over the m crossings p with normals n. If
-    // it lies outside of the cell, the least of the minima on the cell's 6 faces, 12 edges and 8 corners, in this
-    // order, that lie in the cell; the first of several.
-    [[nodiscard]] VOXELPIPE_HD cell_place sharp() const;
+    [[nodiscard]] VOXELPIPE_HD int count() const { return count_; }
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t sum(int axis) const { return sum_[axis]; }
 
 private:
-    triple<std::uint32_t> points_[most];
-    triple<float> normals_[most];
     triple<std::uint64_t> sum_{};
     int count_ = 0;
 };
@@ -114,29 +109,38 @@ private:
     triple<double> b_{};
 };
 
-VOXELPIPE_HD inline cell_place sheet_points::sharp() const {
-    constexpr double unit = 1.0 / (1 << edge_crossing::fraction);
-    triple<double> mean{}, low{}, high{};
-    for (int a = 0; a < 3; ++a) {
-        mean[a] = exact::div(exact::mul(static_cast<double>(sum_[a]), unit), static_cast<double>(count_));
-        low[a] = -mean[a];
-        high[a] = 1.0 - mean[a];
+// The point x that minimizes sum (n . (x - p))^2 + 2^-10 m |x - mean|^2 over the m crossings p with normals n of a
+// sheet. Points are relative to the mean, in units of the samples' spacing.
+class sheet_planes {
+public:
+    VOXELPIPE_HD explicit sheet_planes(const sheet_mean& of)
+        : fit_(exact::mul(static_cast<double>(of.count()), 1.0 / 1024)) {
+        for (int a = 0; a < 3; ++a) {
+            mean_[a] = exact::div(exact::mul(static_cast<double>(of.sum(a)), unit), static_cast<double>(of.count()));
+            low_[a] = -mean_[a];
+            high_[a] = 1.0 - mean_[a];
+        }
     }
-    plane_fit fit(exact::mul(static_cast<double>(count_), 1.0 / 1024));
-    for (int i = 0; i < count_; ++i) {
-        const triple<double> n{
-            {exact::to_double(normals_[i][0]), exact::to_double(normals_[i][1]), exact::to_double(normals_[i][2])}};
+    // A crossing; in the order of their edges.
+    VOXELPIPE_HD void add(const crossing_point& at, float nx, float ny, float nz) {
+        const triple<double> n{{exact::to_double(nx), exact::to_double(ny), exact::to_double(nz)}};
         triple<double> p{};
-        for (int a = 0; a < 3; ++a) p[a] = exact::fma(static_cast<double>(points_[i][a]), unit, -mean[a]);
-        fit.add(n, p);
+        for (int a = 0; a < 3; ++a) p[a] = exact::fma(static_cast<double>(at[a]), unit, -mean_[a]);
+        fit_.add(n, p);
     }
-    triple<double> best = fit.solve();
-    const auto is_within = [&](const triple<double>& y, int a) { return y[a] >= low[a] && y[a] <= high[a]; };
-    if (!is_within(best, 0) || !is_within(best, 1) || !is_within(best, 2)) {
+    [[nodiscard]] VOXELPIPE_HD triple<double> least() const { return fit_.solve(); }
+    // Whether a point lies in the cell.
+    [[nodiscard]] VOXELPIPE_HD bool has(const triple<double>& y) const {
+        return is_within(y, 0) && is_within(y, 1) && is_within(y, 2);
+    }
+    // The least of the minima on the cell's 6 faces, 12 edges and 8 corners, in this order, that lie in the cell; the
+    // first of several.
+    [[nodiscard]] VOXELPIPE_HD triple<double> least_on_border() const {
+        triple<double> best{};
         bool found = false;
         double least = 0.0;
         const auto offer = [&](const triple<double>& y) {
-            const double value = fit.at(y);
+            const double value = fit_.at(y);
             if (found && !(value < least)) return;
             found = true;
             least = value;
@@ -145,26 +149,66 @@ VOXELPIPE_HD inline cell_place sheet_points::sharp() const {
         for (int f = 0; f < 6; ++f) {
             const int i = f / 2, j = i == 0 ? 1 : 0, k = i == 2 ? 1 : 2;
             triple<double> y{};
-            y[i] = f % 2 == 0 ? low[i] : high[i];
-            fit.solve_two(y, i);
+            y[i] = f % 2 == 0 ? low_[i] : high_[i];
+            fit_.solve_two(y, i);
             if (is_within(y, j) && is_within(y, k)) offer(y);
         }
         for (int e = 0; e < 12; ++e) {
             const int k = e / 4, i = k == 0 ? 1 : 0, j = k == 2 ? 1 : 2;
             triple<double> y{};
-            y[i] = (e & 1) == 0 ? low[i] : high[i];
-            y[j] = (e & 2) == 0 ? low[j] : high[j];
-            fit.solve_one(y, k);
+            y[i] = (e & 1) == 0 ? low_[i] : high_[i];
+            y[j] = (e & 2) == 0 ? low_[j] : high_[j];
+            fit_.solve_one(y, k);
             if (is_within(y, k)) offer(y);
         }
         for (int c = 0; c < 8; ++c)
-            offer(
-                {{(c & 1) == 0 ? low[0] : high[0], (c & 2) == 0 ? low[1] : high[1], (c & 4) == 0 ? low[2] : high[2]}});
+            offer({{(c & 1) == 0 ? low_[0] : high_[0], (c & 2) == 0 ? low_[1] : high_[1],
+                    (c & 4) == 0 ? low_[2] : high_[2]}});
+        return best;
     }
-    cell_place r{};
-    for (int a = 0; a < 3; ++a) r.q[a] = inner_place(exact::round_to_int64(exact::mul(mean[a] + best[a], 65536.0)));
-    return r;
-}
+    [[nodiscard]] VOXELPIPE_HD cell_place place(const triple<double>& y) const {
+        cell_place r{};
+        for (int a = 0; a < 3; ++a) r.q[a] = inner_place(exact::round_to_int64(exact::mul(mean_[a] + y[a], 65536.0)));
+        return r;
+    }
+
+private:
+    static constexpr double unit = 1.0 / (1 << edge_crossing::fraction);
+    [[nodiscard]] VOXELPIPE_HD bool is_within(const triple<double>& y, int a) const {
+        return y[a] >= low_[a] && y[a] <= high_[a];
+    }
+
+    triple<double> mean_{}, low_{}, high_{};
+    plane_fit fit_;
+};
+
+// The crossings of one sheet: at most 7, in the order of their edges.
+class sheet_points {
+public:
+    static constexpr int most = 7;
+
+    // A crossing of the edge along `axis` whose lower corner of the cell is `corner`.
+    VOXELPIPE_HD void add(int axis, int corner, const edge_crossing& c) {
+        points_[count_] = point_on_edge(axis, corner, c.t);
+        mean_.add(points_[count_]);
+        normals_[count_] = {{c.nx, c.ny, c.nz}};
+        ++count_;
+    }
+    [[nodiscard]] VOXELPIPE_HD cell_place mean() const { return mean_.place(); }
+    // Where sheet_planes is least in the cell.
+    [[nodiscard]] VOXELPIPE_HD cell_place sharp() const {
+        sheet_planes planes(mean_);
+        for (int i = 0; i < count_; ++i) planes.add(points_[i], normals_[i][0], normals_[i][1], normals_[i][2]);
+        const triple<double> y = planes.least();
+        return planes.place(planes.has(y) ? y : planes.least_on_border());
+    }
+
+private:
+    crossing_point points_[most];
+    triple<float> normals_[most];
+    sheet_mean mean_;
+    int count_ = 0;
+};
 
 // ---- quads ----------------------------------------------------------------------------------------------------------
 

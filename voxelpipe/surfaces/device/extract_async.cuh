@@ -48,8 +48,7 @@ namespace device {
 // What finds the crossings of bits: nothing does, they lie in the middle of their edges.
 struct no_crossings {
     static constexpr const std::uint32_t* primitives = nullptr; // of the crossings' triangles
-    void operator()(const core::passes::cell_list&, core::edge_crossing*, core::passes::bounded_surface*,
-                    cudaStream_t) const {}
+    void operator()(const surface_words&, core::edge_crossing*, core::passes::bounded_surface*, cudaStream_t) const {}
 };
 
 // The memory of a call, in the order of its arrays, and its launches.
@@ -64,29 +63,33 @@ public:
     // crosses_mesh: launch() is given what finds the crossings, and vertices have sources.
     extract_call(const view_type& from, const extract_options& options, const surface_limits& room, arena& memory,
                  bool crosses_mesh = false)
-        : from_(from), options_(options), room_(room), grid_{{nullptr, from.extent.x, from.extent.y, from.extent.z}} {
-        const std::uint64_t rows = grid_.rows(), cells = room.cells + 1, vertices = room.vertices + 1,
-                            quads = room.quads + 1;
+        : from_(from), options_(options), room_(room), grid_{{nullptr, from.extent.x, from.extent.y, from.extent.z}},
+          crosses_mesh_(crosses_mesh) {
+        const std::uint64_t groups = num_groups(), cells = room.cells + 1, vertices = room.vertices + 1,
+                            quads = room.quads + 1; // a word has a cell
+        const std::uint32_t blocks = word_blocks(room.cells);
         state_ = memory.take<core::passes::bounded_surface>(1);
         table_ = memory.take<core::cell_sheets>(table_size);
         words_ = memory.take<std::uint32_t>(num_words());
-        first_of_row_ = memory.take<std::uint64_t>(rows + 1);
-        first_of_word_ = memory.take<std::uint32_t>(rows * static_cast<std::uint64_t>(grid_.row_words()));
-        counts_ = memory.take<std::uint32_t>(std::max({rows + 1, cells, vertices, quads}));
-        keys_ = memory.take<std::uint64_t>(cells);
+        masks_ = memory.take<std::uint32_t>(groups);
+        first_of_group_ = memory.take<std::uint64_t>(groups + 1);
+        counts_ = memory.take<std::uint32_t>(std::max({groups + 1, vertices, quads}));
+        word_keys_ = memory.take<std::uint64_t>(cells);
+        surface_words_ = memory.take<core::passes::surface_word>(cells);
+        word_edges_ = memory.take<core::passes::word_edges>(cells);
+        word_faces_ = memory.take<core::passes::word_faces>(cells);
+        sums_ = memory.take<unsigned long long>(std::uint64_t{3} * blocks);
         states_ = memory.take<std::uint16_t>(cells);
-        edges_ = memory.take<std::uint32_t>(cells);
-        first_vertices_ = memory.take<std::uint64_t>(cells);
-        first_edges_ = memory.take<std::uint64_t>(cells);
-        if (!is_bit || crosses_mesh) crossings_ = memory.take<core::edge_crossing>(quads);
+        if (!has_crossings()) places_ = memory.take<core::cell_place>(num_placed_states);
+        if (has_crossings()) crossings_ = memory.take<core::edge_crossing>(quads);
         vertices_ = memory.take<surface_vertex>(vertices);
         if (crosses_mesh) sources_ = memory.take<std::uint32_t>(vertices);
-        quads_ = memory.take<glm::uvec4>(quads);
+        if (leaves_out() || options.quads) quads_ = memory.take<glm::uvec4>(quads);
         parents_ = memory.take<std::uint32_t>(vertices);
-        kept_quads_ = memory.take<std::uint32_t>(quads);
-        sizes_ = memory.take<std::uint64_t>(vertices);
         if (leaves_out()) {
-            places_ = memory.take<std::uint64_t>(vertices);
+            kept_quads_ = memory.take<std::uint32_t>(quads);
+            sizes_ = memory.take<std::uint64_t>(vertices);
+            vertex_places_ = memory.take<std::uint64_t>(vertices);
             quad_places_ = memory.take<std::uint64_t>(quads);
             left_vertices_ = memory.take<surface_vertex>(vertices);
             left_quads_ = memory.take<glm::uvec4>(quads);
@@ -94,18 +97,18 @@ public:
         }
         if (!options.quads) triangles_ = memory.take<glm::uvec3>(2 * quads);
         scan_bytes_ = 0;
-        for (const std::uint64_t n : {rows + 1, cells, vertices, quads})
+        for (const std::uint64_t n : {groups + 1, vertices, quads})
             scan_bytes_ = std::max(scan_bytes_, cell_scan_bytes(static_cast<std::uint32_t>(n)));
         scan_ = memory.take<std::uint8_t>(scan_bytes_);
     }
 
-    // find(cells, crossings, state, stream) writes the crossings of state->cells cells, or stops the call by zeros
+    // find(words, crossings, state, stream) writes the crossings of state->cells cells, or stops the call by zeros
     // there.
     template <class Find = no_crossings>
     void launch(cudaStream_t stream, const Find& find = {}) const {
         using namespace core::passes;
         check(cudaMemsetAsync(state_, 0, sizeof(bounded_surface), stream));
-        static const std::array<core::cell_sheets, table_size> table = core::make_cell_table();
+        const std::array<core::cell_sheets, table_size>& table = core::cell_table();
         upload(
             table_, table.size(), [&](std::size_t i) { return table[i]; }, stream);
         cell_grid cells = grid_;
@@ -115,40 +118,47 @@ public:
         else
             run(num_words(), read_samples<view_type>{from_, options_.level, words_, &state_->counts.nan_samples},
                 stream);
-        const std::uint64_t rows = cells.rows();
-        device::count_active_cells(core::passes::count_active_cells{cells, counts_}, rows + 1, stream);
-        sum(counts_, first_of_row_, rows + 1, stream);
-        run(1, bound_cells{first_of_row_ + rows, room_.cells, state_}, stream);
-        device::list_active_cells(core::passes::list_active_cells{cells, first_of_row_, first_of_word_, keys_, states_},
-                                  rows, &state_->cells, stream);
-        run(room_.cells + 1,
-            flip_bounded_cells{{cells.samples, table_, keys_, ~std::uint64_t{0}, states_, counts_, edges_},
-                               &state_->cells},
-            stream);
-        sum(counts_, first_vertices_, room_.cells + 1, stream);
-        sum(edges_, first_edges_, room_.cells + 1, stream);
-        run(1,
-            bound_vertices{first_vertices_ + room_.cells, first_edges_ + room_.cells, room_.vertices, room_.quads,
-                           state_},
-            stream);
-        const cell_list list{{cells, first_of_word_}, table_, keys_, states_, first_vertices_, first_edges_};
-        if constexpr (!is_bit)
-            run(room_.cells,
-                bounded<cross_field<cell_list, view_type>>{
-                    {list, from_, options_.level, crossings_, &state_->counts.made_crossings}, &state_->cells},
+        const word_groups where{cells, masks_, first_of_group_};
+        mark_words(where, masks_, counts_, &state_->all_cells, stream);
+        sum(counts_, first_of_group_, num_groups() + 1, stream);
+        run(1, bound_cells{first_of_group_ + num_groups(), room_.cells, state_}, stream);
+        list_words(where, &state_->words, word_keys_, stream);
+        number_surface_words({cells, table_, &state_->words, word_keys_, surface_words_, word_edges_, word_faces_,
+                              states_, sums_, word_blocks(room_.cells), state_->totals},
+                             stream);
+        run(1, bound_vertices{room_.vertices, room_.quads, state_}, stream);
+        const surface_words words{where,          table_,      &state_->words, word_keys_,
+                                  surface_words_, word_edges_, word_faces_,    states_};
+        const std::uint32_t blocks = word_blocks(room_.cells);
+        if (has_crossings()) {
+            if constexpr (!is_bit)
+                for_word_edges<all_axes>(
+                    words, blocks,
+                    cross_field<view_type>{from_, options_.level, crossings_, &state_->counts.made_crossings}, stream);
+            find(words, crossings_, state_, stream);
+            place_crossed(words, blocks, {options_.place, crossings_, find.primitives, vertices_, sources_}, stream);
+        } else {
+            run(num_placed_states, place_states{table_, options_.place, places_}, stream);
+            place_words(words, blocks, places_, vertices_, stream);
+        }
+        const bool folds = options_.place == place::sharp;
+        if (quads_ != nullptr)
+            list_faces(words, blocks, {nullptr, false, nullptr, quads_}, stream);
+        else
+            list_faces(words, blocks, {vertices_, folds, triangles_, nullptr}, stream);
+        if (leaves_out())
+            choose_parts(stream);
+        else
+            count_components(words, blocks, parents_, &state_->parts[static_cast<int>(part_count::found)], stream);
+        const std::uint64_t *vertices_left = nullptr, *quads_left = nullptr;
+        if (leaves_out()) {
+            vertices_left = vertex_places_ + room_.vertices;
+            quads_left = quad_places_ + room_.quads;
+        }
+        run(1, count_surface{vertices_left, quads_left, options_.quads, state_}, stream);
+        if (leaves_out() && !options_.quads)
+            run(room_.quads, bounded<cut_quads>{{left_vertices_, left_quads_, folds, triangles_}, &state_->quads},
                 stream);
-        find(list, crossings_, state_, stream);
-        run(room_.cells,
-            bounded<place_vertices<cell_list>>{{list, options_.place, crossings_, vertices_, find.primitives, sources_},
-                                               &state_->cells},
-            stream);
-        run(room_.cells, bounded<list_quads<cell_list>>{{list, quads_}, &state_->cells}, stream);
-        choose_parts(stream);
-        if (options_.quads) return;
-        run(room_.quads,
-            bounded<cut_quads>{{left_vertices(), left_quads(), options_.place == place::sharp, triangles_},
-                               &state_->quads},
-            stream);
     }
     [[nodiscard]] core::passes::bounded_surface* state() const { return state_; }
     [[nodiscard]] const surface_limits& room() const { return room_; }
@@ -159,10 +169,15 @@ public:
     }
 
 private:
+    [[nodiscard]] std::uint64_t num_groups() const {
+        return core::passes::word_groups{grid_, nullptr, nullptr}.count();
+    }
+    [[nodiscard]] bool has_crossings() const { return !is_bit || crosses_mesh_; } // else they are in the middle
+    // Words of the samples that are not read in place.
     [[nodiscard]] std::uint64_t num_words() const {
         return is_plain ? 0 : core::storage_map<bit, layout::linear>::cells(from_.extent);
     }
-    [[nodiscard]] bool leaves_out() const { return options_.border == border::open || options_.min_component != 0; }
+    [[nodiscard]] bool leaves_out() const { return core::leaves_parts_out(options_); }
     [[nodiscard]] const surface_vertex* left_vertices() const { return leaves_out() ? left_vertices_ : vertices_; }
     [[nodiscard]] const glm::uvec4* left_quads() const { return leaves_out() ? left_quads_ : quads_; }
 
@@ -187,35 +202,35 @@ private:
             stream);
         run(room_.vertices, bounded<count_members>{{sets, counts_, sizes_}, vertices}, stream);
         run(room_.vertices, bounded<choose_components>{{sets, sizes_, least, state_->parts}, vertices}, stream);
-        const std::uint64_t *vertices_left = nullptr, *quads_left = nullptr;
-        if (leaves_out()) {
-            constexpr std::uint64_t all = ~std::uint64_t{0};
-            run(room_.vertices + 1, drop_bounded<drop_vertices>{{sets, sizes_, least, all, counts_}, vertices}, stream);
-            run(room_.quads + 1, drop_bounded<drop_quads>{{quads_, counts_, all, kept_quads_}, quads}, stream);
-            sum(counts_, places_, room_.vertices + 1, stream);
-            sum(kept_quads_, quad_places_, room_.quads + 1, stream);
-            run(room_.vertices,
-                bounded<move_vertices>{{counts_, places_, vertices_, sources_, left_vertices_, left_sources_},
-                                       vertices},
-                stream);
-            run(room_.quads, bounded<move_quads>{{kept_quads_, quad_places_, places_, quads_, left_quads_}, quads},
-                stream);
-            vertices_left = places_ + room_.vertices;
-            quads_left = quad_places_ + room_.quads;
-        }
-        run(1, count_surface{vertices_left, quads_left, options_.quads, state_}, stream);
+        constexpr std::uint64_t all = ~std::uint64_t{0};
+        run(room_.vertices + 1, drop_bounded<drop_vertices>{{sets, sizes_, least, all, counts_}, vertices}, stream);
+        run(room_.quads + 1, drop_bounded<drop_quads>{{quads_, counts_, all, kept_quads_}, quads}, stream);
+        sum(counts_, vertex_places_, room_.vertices + 1, stream);
+        sum(kept_quads_, quad_places_, room_.quads + 1, stream);
+        run(room_.vertices,
+            bounded<move_vertices>{{counts_, vertex_places_, vertices_, sources_, left_vertices_, left_sources_},
+                                   vertices},
+            stream);
+        run(room_.quads, bounded<move_quads>{{kept_quads_, quad_places_, vertex_places_, quads_, left_quads_}, quads},
+            stream);
     }
 
     view_type from_;
     extract_options options_;
     surface_limits room_;
     core::passes::cell_grid grid_;
+    bool crosses_mesh_;
     core::passes::bounded_surface* state_ = nullptr;
     core::cell_sheets* table_ = nullptr;
-    std::uint32_t *words_ = nullptr, *first_of_word_ = nullptr, *counts_ = nullptr, *edges_ = nullptr,
-                  *parents_ = nullptr, *kept_quads_ = nullptr, *sources_ = nullptr, *left_sources_ = nullptr;
-    std::uint64_t *first_of_row_ = nullptr, *keys_ = nullptr, *first_vertices_ = nullptr, *first_edges_ = nullptr,
-                  *sizes_ = nullptr, *places_ = nullptr, *quad_places_ = nullptr;
+    core::cell_place* places_ = nullptr;
+    core::passes::surface_word* surface_words_ = nullptr;
+    core::passes::word_edges* word_edges_ = nullptr;
+    core::passes::word_faces* word_faces_ = nullptr;
+    unsigned long long* sums_ = nullptr;
+    std::uint32_t *words_ = nullptr, *masks_ = nullptr, *counts_ = nullptr, *parents_ = nullptr, *kept_quads_ = nullptr,
+                  *sources_ = nullptr, *left_sources_ = nullptr;
+    std::uint64_t *first_of_group_ = nullptr, *word_keys_ = nullptr, *sizes_ = nullptr, *vertex_places_ = nullptr,
+                  *quad_places_ = nullptr;
     std::uint16_t* states_ = nullptr;
     core::edge_crossing* crossings_ = nullptr;
     surface_vertex *vertices_ = nullptr, *left_vertices_ = nullptr;
@@ -231,9 +246,9 @@ private:
     if (const status s = core::validate(options); !s.ok()) return s;
     if (is_bit && options.level != 0.0) return core::failure(status_code::bad_surface_options);
     if (options.embedded) return core::failure(status_code::strategy_unavailable);
-    const std::uint64_t rows =
-        static_cast<std::uint64_t>(samples.extent.y + 1) * static_cast<std::uint64_t>(samples.extent.z + 1);
-    for (const std::uint64_t n : {room.cells, room.vertices, room.quads, rows})
+    const core::passes::cell_grid cells{{nullptr, samples.extent.x, samples.extent.y, samples.extent.z}};
+    const std::uint64_t groups = core::passes::word_groups{cells, nullptr, nullptr}.count();
+    for (const std::uint64_t n : {room.cells, room.vertices, room.quads, groups})
         if (n >= core::max_numbered) return core::failure(status_code::size_overflow);
     return {};
 }

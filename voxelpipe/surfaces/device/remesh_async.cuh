@@ -64,7 +64,7 @@ struct stop_without_solid {
     const remesh_state* state;
     core::passes::bounded_surface* surface;
     VOXELPIPE_HD void operator()(std::uint64_t) const {
-        if (has_failed(state->call, room)) surface->cells = surface->vertices = surface->quads = 0;
+        if (has_failed(state->call, room)) surface->words = surface->cells = surface->vertices = surface->quads = 0;
     }
 };
 // Leaves nothing to do if the crossings do not fit.
@@ -76,7 +76,7 @@ struct bound_mesh_crossings {
     VOXELPIPE_HD void operator()(std::uint64_t) const {
         if (surface->cells == 0) return; // they have not been counted
         if (*total > state->all_crossings) state->all_crossings = *total;
-        if (*total > room) surface->cells = surface->vertices = surface->quads = 0;
+        if (*total > room) surface->words = surface->cells = surface->vertices = surface->quads = 0;
     }
 };
 // Counts zeros where the call has failed, since indices may name no vertex then.
@@ -154,8 +154,8 @@ public:
             keys_[i] = memory.take<std::uint64_t>(room_);
             found_[i] = memory.take<std::uint32_t>(room_);
         }
-        first_of_row_ =
-            memory.take<std::uint64_t>(std::max({rows<0>().rows(), rows<1>().rows(), rows<2>().rows()}) + 1);
+        ranges_ =
+            memory.take<core::passes::row_range>(std::max({rows<0>().rows(), rows<1>().rows(), rows<2>().rows()}));
         sort_bytes_ = std::max({sort_bytes_of<0>(), sort_bytes_of<1>(), sort_bytes_of<2>()});
         sort_ = memory.take<std::uint8_t>(sort_bytes_);
         const target_view<bits_target> bits{bits_, samples.extent};
@@ -193,12 +193,12 @@ private:
     struct crossing_finder {
         const remesh_call& call;
         const std::uint32_t* primitives;
-        void operator()(const core::passes::cell_list& cells, core::edge_crossing* crossings,
+        void operator()(const surface_words& words, core::edge_crossing* crossings,
                         core::passes::bounded_surface* surface, cudaStream_t stream) const {
             call.run(1, stop_without_solid{{0, 0, call.room_, 0}, call.state_, surface}, stream);
-            call.template cross<0>(cells, crossings, surface, stream);
-            call.template cross<1>(cells, crossings, surface, stream);
-            call.template cross<2>(cells, crossings, surface, stream);
+            call.template cross<0>(words, crossings, surface, stream);
+            call.template cross<1>(words, crossings, surface, stream);
+            call.template cross<2>(words, crossings, surface, stream);
         }
     };
     template <class F>
@@ -257,8 +257,8 @@ private:
 
     // The crossings with the edges along an axis, unless the call has failed.
     template <int Axis>
-    void cross(const core::passes::cell_list& cells, core::edge_crossing* crossings,
-               core::passes::bounded_surface* surface, cudaStream_t stream) const {
+    void cross(const surface_words& words, core::edge_crossing* crossings, core::passes::bounded_surface* surface,
+               cudaStream_t stream) const {
         using namespace core::passes;
         if (triangles_ == 0) return;
         const row_keys<Axis> keys = rows<Axis>();
@@ -280,20 +280,13 @@ private:
         const int at = room_ < 2 ? 0
                                  : sort_by_cell<std::uint64_t>(keys_, found_, room_, keys.key_bits() + 1, sort_,
                                                                sort_bytes_, stage::tile_sort, stream);
-        run(keys.rows() + 1, find_rows{keys_[at], room_, keys.bits, first_of_row_}, stream);
-        const cross_mesh<Axis, cell_list> cross{cells,
-                                                mesh(),
-                                                keys,
-                                                first_of_row_,
-                                                keys_[at],
-                                                room_,
-                                                found_[at],
-                                                core::crossing_rule(options_),
-                                                options_.bodies == bodies::draw,
-                                                samples_.fraction(),
-                                                crossings,
-                                                state_->edges};
-        run(extract_->room().cells, bounded<cross_mesh<Axis, cell_list>>{cross, any}, stream);
+        run(keys.rows(), clear_rows{ranges_}, stream);
+        run(room_, find_rows{keys_[at], room_, keys.rows(), keys.bits, ranges_}, stream);
+        for_word_edges<Axis>(words, word_blocks(extract_->room().cells),
+                             cross_mesh<Axis>{mesh(), keys, ranges_, keys_[at], room_, found_[at],
+                                              core::crossing_rule(options_), options_.bodies == bodies::draw,
+                                              samples_.fraction(), crossings, state_->edges},
+                             stream);
     }
 
     std::span<const draw_type> draws_;
@@ -309,7 +302,8 @@ private:
     core::snapped_position* positions_ = nullptr;
     glm::uvec3* indices_ = nullptr;
     std::uint32_t *names_ = nullptr, *body_ = nullptr, *counts_ = nullptr;
-    std::uint64_t *first_ = nullptr, *first_of_row_ = nullptr;
+    std::uint64_t* first_ = nullptr;
+    core::passes::row_range* ranges_ = nullptr;
     unsigned long long* places_ = nullptr;
     std::uint8_t *scan_ = nullptr, *sort_ = nullptr;
     std::size_t scan_bytes_ = 0, sort_bytes_ = 0;

@@ -15,7 +15,8 @@ namespace voxelpipe::core::passes {
 struct bounded_surface {
     surface_counters counts;                          // of the surface; zeros where something does not fit
     std::uint64_t all_cells, all_vertices, all_quads; // that there are, before parts are left out
-    std::uint64_t cells, vertices, quads;             // that passes work on
+    std::uint64_t words, cells, vertices, quads;      // that passes work on
+    std::uint64_t totals[3];                          // cells, vertices and crossed edges, as far as cells fit
     std::uint64_t parts[static_cast<int>(part_count::count)];
 };
 
@@ -38,40 +39,28 @@ struct if_any {
     }
 };
 
-// Whether the cells fit.
+// Whether the cells fit; all_cells is known.
 struct bound_cells {
-    const std::uint64_t* total;
+    const std::uint64_t* num_words;
     std::uint64_t room;
     bounded_surface* state;
     VOXELPIPE_HD void operator()(std::uint64_t) const {
-        state->all_cells = *total;
-        state->cells = *total <= room ? *total : 0;
+        const bool fits = state->all_cells <= room;
+        state->words = fits ? *num_words : 0;
+        state->cells = fits ? state->all_cells : 0;
     }
 };
 // Whether the vertices and the quads fit.
 struct bound_vertices {
-    const std::uint64_t *vertices, *quads;
     std::uint64_t vertex_room, quad_room;
     bounded_surface* state;
     VOXELPIPE_HD void operator()(std::uint64_t) const {
-        state->all_vertices = *vertices;
-        state->all_quads = *quads;
-        const bool fits = *vertices <= vertex_room && *quads <= quad_room;
-        if (!fits) state->cells = 0;
-        state->vertices = fits ? *vertices : 0;
-        state->quads = fits ? *quads : 0;
-    }
-};
-
-// flip_cells with zeros behind the cells.
-struct flip_bounded_cells {
-    flip_cells<sample_bits> flips;
-    const std::uint64_t* cells;
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        if (i < *cells)
-            flips(i);
-        else
-            flips.sheets[i] = flips.edges[i] = 0;
+        state->all_vertices = state->totals[1];
+        state->all_quads = state->totals[2];
+        const bool fits = state->all_vertices <= vertex_room && state->all_quads <= quad_room;
+        if (!fits) state->words = state->cells = 0;
+        state->vertices = fits ? state->all_vertices : 0;
+        state->quads = fits ? state->all_quads : 0;
     }
 };
 

@@ -20,10 +20,17 @@
 
 namespace voxelpipe::core {
 
+// The table of cells, in the host's memory.
+[[nodiscard]] inline const std::array<cell_sheets, 512>& cell_table() {
+    static const std::array<cell_sheets, 512> table = make_cell_table();
+    return table;
+}
+
 // Cells that a surface passes, with their sheets and crossed edges numbered. What lists them is derived from it.
 template <class Backend>
 class numbered_cells {
 public:
+    static constexpr bool makes_meshes = false; // passes make vertices and faces
     [[nodiscard]] bool are_too_many() const { return num_vertices_ > most; }
     [[nodiscard]] std::uint64_t count() const { return count_; }
     [[nodiscard]] std::uint64_t num_vertices() const { return num_vertices_; }
@@ -35,7 +42,7 @@ protected:
     static constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
 
     explicit numbered_cells(Backend& backend)
-        : table_(backend, array_view<const cell_sheets>(host_table())), keys_(backend, 0), states_(backend, 0),
+        : table_(backend, array_view<const cell_sheets>(cell_table())), keys_(backend, 0), states_(backend, 0),
           first_vertices_(backend, 0), first_edges_(backend, 0) {}
 
     // Makes room for the keys and corners of cells; false: there are too many.
@@ -70,16 +77,11 @@ protected:
     buffer<std::uint16_t> states_;
 
 private:
-    static const std::array<cell_sheets, 512>& host_table() {
-        static const std::array<cell_sheets, 512> table = make_cell_table();
-        return table;
-    }
-
     buffer<std::uint64_t> first_vertices_, first_edges_;
     std::uint64_t count_ = 0, num_vertices_ = 0, num_edges_ = 0;
 };
 
-// The cells of a grid of bits.
+// The cells of a grid of bits. A backend may have a class of its own for them, with the same bytes.
 template <class Backend>
 class surface_cells : public numbered_cells<Backend> {
     using base = numbered_cells<Backend>;
@@ -111,11 +113,39 @@ public:
 
     // Refers to the object.
     [[nodiscard]] list_type list() const { return base::list_by(passes::word_index{grid_, first_of_word_.data()}); }
+    [[nodiscard]] const passes::cell_grid& grid() const { return grid_; }
 
 private:
     passes::cell_grid grid_;
     buffer<std::uint32_t> first_of_word_;
 };
+
+// Calls use(number, axis, low, goes_out) for crossed edges of all cells, along Axis or all of them: as
+// passes::edges_of_cell.
+template <int Axis, class Backend, class Cells, class Use>
+void for_each_edge(Backend& backend, const Cells& cells, const Use& use) {
+    if constexpr (Cells::makes_meshes)
+        cells.template for_each_edge<Axis>(use);
+    else
+        backend.for_each(cells.count(), passes::edges_of_cell<Axis, typename Cells::list_type, Use>{cells.list(), use});
+}
+
+// True if a surface may have parts that the options leave out.
+[[nodiscard]] inline bool leaves_parts_out(const extract_options& o) {
+    return o.border == border::open || o.min_component != 0;
+}
+
+// The number of components of a surface of which nothing is left out: each vertex is used by a quad. Waits.
+template <class Backend>
+[[nodiscard]] std::uint64_t count_components(Backend& backend, const surface<Backend>& of) {
+    typename Backend::template buffer<std::uint32_t> parents(backend, of.vertices.size());
+    typename Backend::template buffer<std::uint64_t> found(backend, 1);
+    backend.for_each(of.vertices.size(), passes::start_sets{parents.data()});
+    backend.for_each(1, passes::clear_counts{found.data()});
+    backend.for_each(of.quads.size(), passes::join_all_quads{of.quads.data(), {parents.data()}});
+    backend.for_each(of.vertices.size(), passes::count_sets{parents.data(), found.data()});
+    return found.to_host(backend)[0];
+}
 
 // Leaves out what the options ask for, and counts components.
 template <class Backend>
@@ -187,6 +217,21 @@ void embed(Backend& backend, const Cells& cells, const edge_crossing* crossings,
     }
 }
 
+// The vertices of all cells, and their sources where primitives are given.
+template <class Backend, class Cells>
+void place_all(const Cells& cells, place where, const edge_crossing* crossings, const std::uint32_t* primitives,
+               surface<Backend>& made, Backend& backend) {
+    if constexpr (Cells::makes_meshes) {
+        if (crossings == nullptr) {
+            cells.place_middles(where, made.vertices.data());
+            return;
+        }
+    }
+    backend.for_each(cells.count(), passes::place_vertices<typename Cells::list_type>{cells.list(), where, crossings,
+                                                                                      made.vertices.data(), primitives,
+                                                                                      made.sources.data()});
+}
+
 // The surface of cells whose crossings are known; null: all in the middle of their edges. primitives: of the crossings'
 // triangles; null: vertices have no sources. Returns what the call returns, `result` with the surface's counts.
 template <class Backend, class Cells>
@@ -198,21 +243,42 @@ template <class Backend, class Cells>
     surface<Backend> made(backend);
     made.samples = samples;
     made.vertices = typename Backend::template buffer<surface_vertex>(backend, cells.num_vertices());
-    made.quads = typename Backend::template buffer<glm::uvec4>(backend, cells.num_edges());
     if (has_sources) made.sources = typename Backend::template buffer<std::uint32_t>(backend, cells.num_vertices());
-    backend.for_each(cells.count(),
-                     passes::place_vertices<list_type>{cells.list(), options.place, crossings, made.vertices.data(),
-                                                       primitives, made.sources.data()});
-    backend.for_each(cells.count(), passes::list_quads<list_type>{cells.list(), made.quads.data()});
+    place_all(cells, options.place, crossings, primitives, made, backend);
+    const bool folds = options.place == place::sharp, parts = leaves_parts_out(options);
+    const auto make_triangles = [&] {
+        result.surface.faces = 2 * result.surface.faces;
+        made.triangles = typename Backend::template buffer<glm::uvec3>(backend, result.surface.faces);
+    };
+    if constexpr (Cells::makes_meshes) {
+        if (!options.quads && !options.embedded && !parts) { // there are no quads between
+            result.surface.vertices = cells.num_vertices();
+            result.surface.faces = cells.num_edges();
+            make_triangles();
+            cells.list_triangles(made.vertices.data(), folds, made.triangles.data());
+            result.surface.components = cells.count_components();
+            out = std::move(made);
+            return result;
+        }
+    }
+    made.quads = typename Backend::template buffer<glm::uvec4>(backend, cells.num_edges());
+    if constexpr (Cells::makes_meshes)
+        cells.list_quads(made.quads.data());
+    else
+        backend.for_each(cells.count(), passes::list_quads<list_type>{cells.list(), made.quads.data()});
     if (options.embedded) embed(backend, cells, crossings, options.place, made, result.surface);
-    choose_parts(backend, options, made, result.surface);
+    if (parts)
+        choose_parts(backend, options, made, result.surface);
+    else if constexpr (Cells::makes_meshes)
+        result.surface.components = cells.count_components();
+    else
+        result.surface.components = count_components(backend, made);
     result.surface.vertices = made.vertices.size();
     result.surface.faces = made.quads.size();
     if (!options.quads) {
-        result.surface.faces = 2 * made.quads.size();
-        made.triangles = typename Backend::template buffer<glm::uvec3>(backend, result.surface.faces);
-        backend.for_each(made.quads.size(), passes::cut_quads{made.vertices.data(), made.quads.data(),
-                                                              options.place == place::sharp, made.triangles.data()});
+        make_triangles();
+        backend.for_each(made.quads.size(),
+                         passes::cut_quads{made.vertices.data(), made.quads.data(), folds, made.triangles.data()});
         made.quads = typename Backend::template buffer<glm::uvec4>(backend, 0);
     }
     out = std::move(made);

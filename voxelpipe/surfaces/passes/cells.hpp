@@ -166,6 +166,10 @@ struct word_index {
         const std::uint32_t below = cell_rows(cells.samples, w, y, z).active() & ((1u << (x & 31)) - 1);
         return first_of_word[word] + static_cast<std::uint32_t>(exact::count_ones(below));
     }
+    // Number of the first cell of a row, or of what follows it. The rows are below cells.rows().
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t first_cell(std::uint64_t row) const {
+        return first_of_word[row * static_cast<std::uint64_t>(cells.row_words())];
+    }
 };
 
 // The cells that a surface passes, in the order of their numbers. An index finds them by position.
@@ -197,6 +201,31 @@ struct indexed_cells {
 
 // The cells of a grid of bits.
 using cell_list = indexed_cells<word_index>;
+
+// Calls use(number, axis, low, goes_out) for the crossed edges along Axis that begin at the lowest sample of cell i, or
+// with all_axes along all of them: `low` is that sample, and goes_out is true if it is inside.
+inline constexpr int all_axes = 3;
+template <int Axis, class Cells, class Use>
+struct edges_of_cell {
+    Cells cells;
+    Use use;
+
+    VOXELPIPE_ANY_CALLABLE
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const auto cell = static_cast<std::uint32_t>(i);
+        const int corners = cells.states[cell] & 255;
+        if (Axis != all_axes && !is_crossed(corners, 4 * Axis)) return;
+        const cell_key at{cells.keys[cell]};
+        const glm::ivec3 low(at.x() - 1, at.y() - 1, at.z() - 1);
+        const bool goes_out = (corners & 1) != 0;
+        std::uint64_t number = cells.first_edges[cell];
+        for (int axis = 0; axis < 3; ++axis) {
+            if (!is_crossed(corners, 4 * axis)) continue;
+            if (Axis == all_axes || axis == Axis) use(number, axis, low, goes_out);
+            ++number;
+        }
+    }
+};
 
 // Decides the flips: a face both of whose segments lie in one sheet in both of its cells. Looks at samples alone, so
 // that all are decided on unflipped cells. Counts the sheets, and the crossed edges of the lowest sample. `samples` has

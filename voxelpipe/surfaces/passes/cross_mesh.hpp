@@ -4,7 +4,7 @@
 
 // Where a mesh crosses the edges that a surface crosses: of the crossings of the row between the edge's samples, sorted
 // by exact position, then triangle, those at which the verdict of the fill rule changes; they are odd in number where
-// the samples' verdicts differ, and the middle one of them is the edge's. A functor for a backend's for_each.
+// the samples' verdicts differ, and the middle one of them is the edge's.
 
 #include <voxelpipe/core/shared_counter.hpp>
 #include <voxelpipe/solid/solid.hpp>
@@ -19,13 +19,12 @@ namespace voxelpipe::core::passes {
 // Counts of all edges.
 enum class edge_count : int { on_cones, made, count };
 
-// The crossed edges along Axis that begin at the lowest sample of cell i.
-template <int Axis, class Cells>
+// The crossing of a crossed edge along Axis. For edges_of_cell.
+template <int Axis>
 struct cross_mesh {
-    Cells cells;
     mesh_triangles mesh;
     row_keys<Axis> rows;
-    const std::uint64_t* first_of_row; // null: rows are looked for among the keys
+    const row_range* ranges; // of rows; null: rows are looked for among the keys
     const std::uint64_t* keys;
     std::uint64_t count; // of keys
     const std::uint32_t* triangles;
@@ -36,13 +35,9 @@ struct cross_mesh {
     std::uint64_t* counts;       // by edge_count
     counted_layers counted = {}; // of cells
 
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const auto cell = static_cast<std::uint32_t>(i);
-        const int corners = cells.states[cell] & 255;
-        if (!is_crossed(corners, 4 * Axis)) return;
-        const cell_key at{cells.keys[cell]};
-        const std::int64_t p[3] = {at.x() - 1, at.y() - 1, at.z() - 1};
-        crossings[cells.edge(cell, Axis)] = find(p, (corners & 1) != 0, counted.has(at.z()));
+    VOXELPIPE_HD void operator()(std::uint64_t number, int, const glm::ivec3& low, bool goes_out) const {
+        const std::int64_t p[3] = {low.x, low.y, low.z};
+        crossings[number] = find(p, goes_out, counted.has(low.z + 1));
     }
 
 private:
@@ -61,12 +56,15 @@ private:
     }
     [[nodiscard]] VOXELPIPE_HD static std::int64_t winding_of(std::uint64_t key) { return (key & 1) != 0 ? -1 : 1; }
 
-    [[nodiscard]] VOXELPIPE_HD std::uint64_t begin_of(std::uint64_t row) const {
-        return first_of_row != nullptr ? first_of_row[row] : count_below(keys, count, row << rows.bits);
+    [[nodiscard]] VOXELPIPE_HD row_range range_of(std::uint64_t row) const {
+        if (ranges != nullptr) return ranges[row];
+        return {count_below(keys, count, row << rows.bits), count_below(keys, count, (row + 1) << rows.bits)};
     }
     [[nodiscard]] VOXELPIPE_HD edge_crossing find(const std::int64_t (&p)[3], bool goes_out, bool is_counted) const {
         constexpr int u = row_keys<Axis>::u, v = row_keys<Axis>::v;
-        const std::uint64_t row = rows.row(p[u], p[v]), low = begin_of(row), length = begin_of(row + 1) - low;
+        const std::uint64_t row = rows.row(p[u], p[v]);
+        const row_range range = range_of(row);
+        const std::uint64_t low = range.begin, length = range.end - low;
         // The first sample beyond these crossings is the edge's upper one.
         const std::uint64_t from = rows.key(row, p[Axis] + 1, false), to = rows.key(row, p[Axis] + 2, false);
         const stretch s{low, low + count_below(keys + low, length, from), low + count_below(keys + low, length, to)};

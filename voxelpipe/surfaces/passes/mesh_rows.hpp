@@ -140,13 +140,26 @@ private:
     }
 };
 
-// Where row i begins in the list; the last is the end.
+// Where the crossings of a row lie in the list; nowhere if begin and end are equal.
+struct row_range {
+    std::uint64_t begin, end;
+};
+struct clear_rows {
+    row_range* ranges;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const { ranges[i] = {}; }
+};
+// The ranges of rows below num_rows that have crossings, from crossing i.
 struct find_rows {
     const std::uint64_t* keys;
-    std::uint64_t count;
+    std::uint64_t count, num_rows;
     int bits;
-    std::uint64_t* first;
-    VOXELPIPE_HD void operator()(std::uint64_t i) const { first[i] = count_below(keys, count, i << bits); }
+    row_range* ranges;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const std::uint64_t row = keys[i] >> bits;
+        if (row >= num_rows) return; // behind the crossings
+        if (i == 0 || keys[i - 1] >> bits != row) ranges[row].begin = i;
+        if (i + 1 == count || keys[i + 1] >> bits != row) ranges[row].end = i + 1;
+    }
 };
 
 } // namespace voxelpipe::core::passes

@@ -26,6 +26,30 @@ struct start_vertices {
     }
 };
 
+// For parts of which none is left out: each vertex by itself, the vertices of quad i joined, and the number of sets
+// that there are then.
+struct start_sets {
+    std::uint32_t* parents;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const { parents[i] = static_cast<std::uint32_t>(i); }
+};
+struct join_all_quads {
+    const glm::uvec4* quads;
+    vertex_sets sets;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        const glm::uvec4 q = quads[i];
+        sets.join(q.x, q.y);
+        sets.join(q.y, q.z);
+        sets.join(q.z, q.w);
+    }
+};
+struct count_sets {
+    const std::uint32_t* parents;
+    std::uint64_t* count;
+    VOXELPIPE_HD void operator()(std::uint64_t i) const {
+        if (parents[i] == i) add_shared(*count, 1);
+    }
+};
+
 // Joins and marks the vertices of quad i, unless it reaches beyond the grid and the border is open. All threads write
 // the same value to a mark.
 struct join_quads {

@@ -46,39 +46,30 @@ struct read_samples {
     }
 };
 
-// Where a field crosses the edges that begin at the lowest sample of cell i: t = d0 / (d0 - d1), d the values minus the
-// level. In the middle where that is no number from 0 to 1: next to a NaN, and at the faces of the grid.
-template <class Cells, class View>
+// Where a field crosses an edge: t = d0 / (d0 - d1), d the values minus the level. In the middle where that is no
+// number from 0 to 1: next to a NaN, and at the faces of the grid. For edges_of_cell.
+template <class View>
 struct cross_field {
-    Cells cells;
     View from;
     double level;
     edge_crossing* crossings;
     std::uint64_t* made;         // a count
     counted_layers counted = {}; // of cells
 
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const auto cell = static_cast<std::uint32_t>(i);
-        const cell_key at{cells.keys[cell]};
-        const int corners = cells.states[cell] & 255;
-        std::uint64_t next = cells.first_edges[cell];
-        const int x = at.x() - 1, y = at.y() - 1, z = at.z() - 1;
-        for (int axis = 0; axis < 3; ++axis) {
-            if (!is_crossed(corners, 4 * axis)) continue;
-            const int ux = x + (axis == 0 ? 1 : 0), uy = y + (axis == 1 ? 1 : 0), uz = z + (axis == 2 ? 1 : 0);
-            edge_crossing c;
-            double t = -1.0;
-            if (from.has(x, y, z) && from.has(ux, uy, uz)) {
-                const double below = exact::to_double(from(x, y, z)) - level,
-                             above = exact::to_double(from(ux, uy, uz)) - level;
-                t = exact::div(below, below - above);
-            }
-            if (t >= 0.0 && t <= 1.0)
-                c.t = static_cast<std::uint32_t>(exact::round_to_int64(exact::mul(t, 1 << edge_crossing::fraction)));
-            else if (counted.has(at.z()))
-                add_shared(*made, 1);
-            crossings[next++] = c;
+    VOXELPIPE_HD void operator()(std::uint64_t number, int axis, const glm::ivec3& low, bool) const {
+        const glm::ivec3 high(low.x + (axis == 0 ? 1 : 0), low.y + (axis == 1 ? 1 : 0), low.z + (axis == 2 ? 1 : 0));
+        edge_crossing c;
+        double t = -1.0;
+        if (from.has(low.x, low.y, low.z) && from.has(high.x, high.y, high.z)) {
+            const double below = exact::to_double(from(low.x, low.y, low.z)) - level,
+                         above = exact::to_double(from(high.x, high.y, high.z)) - level;
+            t = exact::div(below, below - above);
         }
+        if (t >= 0.0 && t <= 1.0)
+            c.t = static_cast<std::uint32_t>(exact::round_to_int64(exact::mul(t, 1 << edge_crossing::fraction)));
+        else if (counted.has(low.z + 1))
+            add_shared(*made, 1);
+        crossings[number] = c;
     }
 };
 

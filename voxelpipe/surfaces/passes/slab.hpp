@@ -16,17 +16,17 @@ struct layer_begin {
 };
 
 // Where layer first + i * layers begins: 0 for the begin of a range of layers, 1 for its end.
+template <class Cells>
 struct find_layers {
-    cell_list cells;
+    Cells cells;
     std::uint64_t count; // of cells
+    cell_grid all;
     int first, layers;
     layer_begin* begins;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const cell_grid& all = cells.index.cells;
         const std::uint64_t row = all.row(0, first + static_cast<int>(i) * layers);
-        const std::uint64_t cell =
-            row < all.rows() ? cells.index.first_of_word[row * static_cast<std::uint64_t>(all.row_words())] : count;
+        const std::uint64_t cell = row < all.rows() ? cells.index.first_cell(row) : count;
         begins[i] = {cells.first_vertices[cell], cells.first_edges[cell]};
     }
 };

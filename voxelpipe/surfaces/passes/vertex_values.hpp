@@ -53,26 +53,16 @@ struct row_weights {
     return {{weight(of_a), weight(of_b), weight(of_c)}, all > 0};
 }
 
-// Shades the crossings of the edges that begin at the lowest sample of cell i.
-template <class Cells, class Shading, class... Values>
+// Shades the crossing of an edge. For edges_of_cell.
+template <class Shading, class... Values>
 struct shade_crossings {
-    Cells cells;
     const edge_crossing* crossings;
     Shading shading;
     crossing_value<Values...>* values;
 
     VOXELPIPE_ANY_CALLABLE
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const auto cell = static_cast<std::uint32_t>(i);
-        const cell_key at{cells.keys[cell]};
-        const int corners = cells.states[cell] & 255;
-        const glm::ivec3 first(at.x() - 1, at.y() - 1, at.z() - 1);
-        std::uint64_t next = cells.first_edges[cell];
-        for (int axis = 0; axis < 3; ++axis) {
-            if (!is_crossed(corners, 4 * axis)) continue;
-            values[next] = shade(crossings[next].triangle, axis, first, (corners & 1) != 0);
-            ++next;
-        }
+    VOXELPIPE_HD void operator()(std::uint64_t number, int axis, const glm::ivec3& low, bool goes_out) const {
+        values[number] = shade(crossings[number].triangle, axis, low, goes_out);
     }
 
 private:
@@ -214,8 +204,8 @@ template <class Backend, class Mesh, class VertexShader, class Shader, class Cel
     if (cells != nullptr) {
         typename Backend::template buffer<passes::crossing_value<Values...>> values(backend, cells->num_edges());
         using cells_type = typename Cells::list_type;
-        backend.for_each(cells->count(), passes::shade_crossings<cells_type, view_type, Values...>{
-                                             cells->list(), crossings, shading.view(), values.data()});
+        for_each_edge<passes::all_axes>(
+            backend, *cells, passes::shade_crossings<view_type, Values...>{crossings, shading.view(), values.data()});
         backend.for_each(vertices + 1,
                          passes::combine_values<cells_type, Values...>{cells->list(), made.vertices.data(),
                                                                        values.data(), vertices, out, missing.data()});

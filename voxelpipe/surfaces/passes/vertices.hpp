@@ -53,10 +53,13 @@ struct place_vertices {
     }
     // The place of vertex v.
     VOXELPIPE_HD void store(std::uint64_t v, const sheet_points& points) const {
-        const cell_place q = where == voxelpipe::place::corner ? cell_place{{{32768, 32768, 32768}}}
-                             : where == voxelpipe::place::mean ? points.mean()
-                                                               : points.sharp();
+        const cell_place q = place_of(where, points);
         for (int a = 0; a < 3; ++a) vertices[v].q[a] = q.q[a];
+    }
+    [[nodiscard]] VOXELPIPE_HD static cell_place place_of(voxelpipe::place where, const sheet_points& points) {
+        return where == voxelpipe::place::corner ? cell_place{{{32768, 32768, 32768}}}
+               : where == voxelpipe::place::mean ? points.mean()
+                                                 : points.sharp();
     }
     // The crossing of an edge of a cell.
     [[nodiscard]] VOXELPIPE_HD edge_crossing crossing(const cell_key& at, int e) const {
