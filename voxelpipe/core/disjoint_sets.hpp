@@ -31,7 +31,9 @@ struct disjoint_sets {
             v = next;
         }
     }
-    // The same without a change. While threads replace parents by roots, a path must not be halved: a thread that has
+    // A number of the set of v: v itself where it is the root.
+    [[nodiscard]] VOXELPIPE_HD Number parent(Number v) const { return load(parents[v]); }
+    // The root without a change. While threads replace parents by roots, a path must not be halved: a thread that has
     // read the path before would put an older parent in the place of a root.
     [[nodiscard]] VOXELPIPE_HD Number find(Number v) const {
         for (;;) {

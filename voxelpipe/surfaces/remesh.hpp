@@ -127,6 +127,16 @@ void find_mesh_crossings(Backend& backend, const Cells& cells, const gathered_me
                                                  counted});
 }
 
+// Along all axes. A backend may have an overload for its cells.
+template <class Backend, class Cells>
+void find_all_mesh_crossings(Backend& backend, const Cells& cells, const gathered_mesh<Backend>& mesh,
+                             const grid& samples, const remesh_options& options, edge_crossing* crossings,
+                             std::uint64_t* counts, const passes::counted_layers& counted) {
+    find_mesh_crossings<0>(backend, cells, mesh, samples, options, crossings, counts, counted);
+    find_mesh_crossings<1>(backend, cells, mesh, samples, options, crossings, counts, counted);
+    find_mesh_crossings<2>(backend, cells, mesh, samples, options, crossings, counts, counted);
+}
+
 // What makes the surface of all cells: finish_surface.
 struct finish_whole {
     template <class Backend, class Cells>
@@ -159,15 +169,13 @@ remesh_cells(Backend& backend, std::span<const draw<Mesh, VertexShader, constant
                                                             static_cast<std::size_t>(passes::edge_count::count));
     backend.for_each(counts.size(), passes::clear_counts{counts.data()});
     const gathered_mesh<Backend> mesh(backend, draws, samples, cones, options.bodies);
-    find_mesh_crossings<0>(backend, cells, mesh, samples, options, crossings.data(), counts.data(), counted);
-    find_mesh_crossings<1>(backend, cells, mesh, samples, options, crossings.data(), counts.data(), counted);
-    find_mesh_crossings<2>(backend, cells, mesh, samples, options, crossings.data(), counts.data(), counted);
-    const std::vector<std::uint64_t> host = counts.to_host(backend);
-    result.surface.cone_crossings = host[static_cast<std::size_t>(passes::edge_count::on_cones)];
-    result.surface.made_crossings = host[static_cast<std::size_t>(passes::edge_count::made)];
+    find_all_mesh_crossings(backend, cells, mesh, samples, options, crossings.data(), counts.data(), counted);
     result = finish(backend, cells, samples, crossings.data(), mesh.view().primitives, extract_options_of(options), out,
                     result);
     if (!result.ok()) return result;
+    const std::vector<std::uint64_t> host = counts.to_host(backend);
+    result.surface.cone_crossings = host[static_cast<std::size_t>(passes::edge_count::on_cones)];
+    result.surface.made_crossings = host[static_cast<std::size_t>(passes::edge_count::made)];
     const status shaded = shade(mesh.view(), &cells, crossings.data(), result.surface);
     return shaded.ok() ? result : shaded;
 }

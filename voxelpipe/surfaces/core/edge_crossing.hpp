@@ -61,6 +61,12 @@ struct edge_position {
         const auto n = static_cast<std::uint64_t>(p.numerator), d = static_cast<std::uint64_t>(p.denominator);
         return static_cast<std::uint32_t>(((n << (f + 1)) + d) / (2 * d));
     }
+    if (p.denominator >> 51 == 0) { // the bits of twice the quotient in two parts, which 64 bits can divide
+        constexpr int upper = 12, lower = f + 1 - upper;
+        const auto n = static_cast<std::uint64_t>(p.numerator), d = static_cast<std::uint64_t>(p.denominator);
+        const std::uint64_t high = (n << upper) / d, rest = (n << upper) - high * d, low = (rest << lower) / d;
+        return static_cast<std::uint32_t>(((high << lower) + low + 1) >> 1);
+    }
     return static_cast<std::uint32_t>(((p.numerator << (f + 1)) + p.denominator) / (2 * p.denominator));
 }
 

@@ -9,6 +9,6 @@
 #include <voxelpipe/distance/device/distance.cuh>
 #include <voxelpipe/distance/device/distance_at.cuh>
 #include <voxelpipe/solid/device/solid.cuh>
-#include <voxelpipe/surfaces/device/word_cells.cuh>
+#include <voxelpipe/surfaces/device/mesh_crossings.cuh>
 #include <voxelpipe/surfaces/extract.hpp>
 #include <voxelpipe/surfaces/remesh.hpp>

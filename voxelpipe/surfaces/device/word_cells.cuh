@@ -8,6 +8,7 @@
 #include <voxelpipe/device/base/for_each.cuh>
 #include <voxelpipe/device/scene/prefix_sum.cuh>
 #include <voxelpipe/surfaces/device/word_edges_kernels.cuh>
+#include <voxelpipe/surfaces/device/word_joins_kernels.cuh>
 #include <voxelpipe/surfaces/passes/build.hpp>
 
 #include <array>

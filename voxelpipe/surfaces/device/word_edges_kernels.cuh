@@ -52,20 +52,21 @@ __global__ __launch_bounds__(words_per_block) void for_word_edges_kernel(const _
 
 // ---- vertices -------------------------------------------------------------------------------------------------------
 
-// Finds the words after word i along x (1), y (2) and z (4), as far as the grid goes.
-__device__ VOXELPIPE_INLINE void find_words_after(const surface_words& all, std::uint64_t i, bool along_x,
-                                                  words_around& found) {
+// Finds the words after word i along x (1), y (2) and z (4), as far as the grid goes. What has no cell is not
+// meaningful. Of a row's words that have a cell, the one after another is the number after it.
+__device__ VOXELPIPE_INLINE void find_words_after(const surface_words& all, std::uint64_t i, words_around& found) {
     const core::passes::cell_key at{all.keys[i]};
-    const core::passes::cell_grid& cells = all.where.cells;
+    const core::passes::sample_bits& samples = all.where.cells.samples;
     const int w = at.x() >> 5, y = at.y(), z = at.z();
-    found[0][threadIdx.x] = static_cast<std::uint32_t>(i);
 #pragma unroll
-    for (int k = 1; k < 8; ++k) {
-        const int dw = k & 1, dy = k >> 1 & 1, dz = k >> 2;
-        const bool exists = w + dw < cells.row_words() && y + dy <= cells.samples.ny && z + dz <= cells.samples.nz;
-        std::uint32_t word = 0;
-        if ((along_x || dw == 0) && exists) word = all.where.find(w + dw, y + dy, z + dz);
-        found[k][threadIdx.x] = word;
+    for (int k = 0; k < 8; k += 2) {
+        const int dy = k >> 1 & 1, dz = k >> 2;
+        core::passes::word_groups::place word{static_cast<std::uint32_t>(i), true};
+        if (k != 0)
+            word = y + dy <= samples.ny && z + dz <= samples.nz ? all.where.look(w, y + dy, z + dz)
+                                                                : core::passes::word_groups::place{};
+        found[k][threadIdx.x] = word.number;
+        found[k + 1][threadIdx.x] = word.number + (word.exists ? 1 : 0);
     }
 }
 
@@ -124,7 +125,7 @@ __global__ __launch_bounds__(words_per_block) void place_crossed_kernel(const __
     if (begin >= n) return;
     const std::uint32_t first = all.words[begin].first_vertex, total = all.words[end].first_vertex - first;
     const surface_word own = i < n ? all.words[i] : surface_word{};
-    if (i < n) find_words_after(all, i, own.active >> 31 != 0, after);
+    if (i < n) find_words_after(all, i, after);
     const auto list = [&](const auto& add) {
         for (std::uint32_t left = own.active; left != 0; left &= left - 1) {
             const int bit = exact::lowest_one(left), sheets = own.num_sheets(bit);

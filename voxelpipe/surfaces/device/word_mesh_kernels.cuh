@@ -2,11 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Vertices, faces and components of a surface from words of cells (passes/words.hpp), on a GPU. A block has 256 words;
+// Vertices and faces of a surface from words of cells (passes/words.hpp), on a GPU. A block has 256 words;
 // it lists what they have in shared memory and gives each thread one item, so that neighbouring threads write
 // neighbouring items. The results are those of passes::place_vertices, list_quads and cut_quads.
 
-#include <voxelpipe/core/disjoint_sets.hpp>
 #include <voxelpipe/surfaces/device/word_kernels.cuh>
 #include <voxelpipe/surfaces/passes/vertices.hpp>
 
@@ -33,41 +32,6 @@ struct surface_words {
         return static_cast<std::uint32_t>(table[states[word.cell(bit)]].of_edge(edge));
     }
 };
-
-// An item of a block's words: the word in the block, its cell, and a sheet or an axis.
-struct word_item {
-    std::uint16_t bits;
-    [[nodiscard]] __device__ static word_item of(unsigned word, int bit, int which) {
-        return {
-            static_cast<std::uint16_t>(word | static_cast<unsigned>(bit) << 8 | static_cast<unsigned>(which) << 13)};
-    }
-    [[nodiscard]] __device__ unsigned word() const { return bits & 255u; }
-    [[nodiscard]] __device__ int bit() const { return bits >> 8 & 31; }
-    [[nodiscard]] __device__ int which() const { return bits >> 13; }
-};
-inline constexpr std::uint32_t word_items = 2048; // of a list in shared memory
-
-// Calls use(k, item, is_one) for the `total` items of the block, k counted from 0, a thread an item; all threads call
-// it equally often, and is_one is false for those without an item. list(add) calls add(item) for the thread's own items
-// in their order, the first of which is number `first`.
-template <class List, class Use>
-__device__ VOXELPIPE_INLINE void for_word_items(word_item (&items)[word_items], std::uint32_t first,
-                                                std::uint32_t total, const List& list, const Use& use) {
-    for (std::uint32_t begin = 0; begin < total; begin += word_items) {
-        __syncthreads();
-        std::uint32_t at = first - begin; // below 0: large
-        list([&](word_item item) {
-            if (at < word_items) items[at] = item;
-            ++at;
-        });
-        __syncthreads();
-        const std::uint32_t count = total - begin < word_items ? total - begin : word_items;
-        for (std::uint32_t k = 0; k < count; k += words_per_block) {
-            const bool is_one = k + threadIdx.x < count;
-            use(begin + k, is_one ? items[k + threadIdx.x] : word_item{0}, is_one);
-        }
-    }
-}
 
 // Copies what the block's threads have left in shared memory, `count` numbers, so that neighbouring threads write
 // neighbouring ones. All threads call it.
@@ -174,18 +138,18 @@ __global__ __launch_bounds__(words_per_block) void place_words_kernel(const __gr
 // Words around those of a block: each itself, and those next to it along x (1), y (2) and z (4).
 using words_around = std::uint32_t[8][words_per_block];
 
-// Finds the words before word i, as far as there are rows and words. What has no cell is not meaningful.
-__device__ VOXELPIPE_INLINE void find_words_before(const surface_words& all, std::uint64_t i, bool along_x,
-                                                   words_around& found) {
+// Finds the words before word i, as far as there are rows and words. What has no cell is not meaningful. Of a row's
+// words that have a cell, the one before another is the number before it.
+__device__ VOXELPIPE_INLINE void find_words_before(const surface_words& all, std::uint64_t i, words_around& found) {
     const core::passes::cell_key at{all.keys[i]};
     const int w = at.x() >> 5, y = at.y(), z = at.z();
-    found[0][threadIdx.x] = static_cast<std::uint32_t>(i);
 #pragma unroll
-    for (int k = 1; k < 8; ++k) {
-        const int dw = k & 1, dy = k >> 1 & 1, dz = k >> 2;
-        std::uint32_t word = 0;
-        if ((along_x || dw == 0) && w >= dw && y >= dy && z >= dz) word = all.where.find(w - dw, y - dy, z - dz);
+    for (int k = 0; k < 8; k += 2) {
+        const int dy = k >> 1 & 1, dz = k >> 2;
+        std::uint32_t word = static_cast<std::uint32_t>(i);
+        if (k != 0) word = y >= dy && z >= dz ? all.where.find(w, y - dy, z - dz) : 0;
         found[k][threadIdx.x] = word;
+        found[k + 1][threadIdx.x] = word == 0 ? 0 : word - 1;
     }
 }
 
@@ -196,6 +160,36 @@ struct face_arrays {
     glm::uvec3* triangles;
     glm::uvec4* quads;
 };
+
+// The place of a face's vertex from the lowest sample of its edge, in units of 2^-16: below 2^17.
+struct place_from {
+    std::int32_t at[3];
+
+    // back: the axes, as bits, along which the vertex's cell lies before the edge's lowest one.
+    [[nodiscard]] __device__ VOXELPIPE_INLINE static place_from of(const surface_vertex& v, int back) {
+        // The three numbers of 16 bits, by two of 32.
+        const auto* const q = reinterpret_cast<const std::uint32_t*>(&v) + 3;
+        const std::uint32_t xy = q[0], z = q[1];
+        return {{static_cast<std::int32_t>(xy & 0xffffu) - ((back & 1) << 16),
+                 static_cast<std::int32_t>(xy >> 16) - ((back & 2) << 15),
+                 static_cast<std::int32_t>(z & 0xffffu) - ((back & 4) << 14)}};
+    }
+    [[nodiscard]] __device__ VOXELPIPE_INLINE std::int64_t square_to(const place_from& o) const {
+        std::int64_t sum = 0;
+#pragma unroll
+        for (int a = 0; a < 3; ++a) {
+            const std::int32_t apart = at[a] - o.at[a];
+            sum += std::int64_t{apart} * apart;
+        }
+        return sum;
+    }
+    [[nodiscard]] __device__ core::lattice_vertex wide() const { return {at[0], at[1], at[2]}; }
+};
+// As core::is_cut_from_first.
+[[nodiscard]] __device__ VOXELPIPE_INLINE bool is_cut_from_first(const place_from (&p)[4], bool folds) {
+    if (folds) return core::is_cut_from_first(p[0].wide(), p[1].wide(), p[2].wide(), p[3].wide(), true);
+    return p[0].square_to(p[2]) <= p[1].square_to(p[3]);
+}
 
 // The face of each crossed edge that begins at a word's cells, as passes::list_quads.
 template <bool MakesQuads>
@@ -217,7 +211,7 @@ __global__ __launch_bounds__(words_per_block) void list_faces_kernel(const __gri
     if (i < n) {
         own = all.edges[i];
         own_first = static_cast<std::uint32_t>(all.words[i].first_edge - first);
-        if ((own.x | own.y | own.z) != 0) find_words_before(all, i, ((own.y | own.z) & 1) != 0, around);
+        if ((own.x | own.y | own.z) != 0) find_words_before(all, i, around);
     }
     const auto list = [&](const auto& add) {
         for (std::uint32_t left = own.x | own.y | own.z; left != 0; left &= left - 1) {
@@ -235,39 +229,35 @@ __global__ __launch_bounds__(words_per_block) void list_faces_kernel(const __gri
             const surface_word word = all.words[begin + item.word()];
             const bool goes_out = (all.states[word.cell(bit)] & 1) != 0; // the lower sample is inside
             std::uint32_t v[4];
-            core::lattice_vertex places[4];
+            place_from places[4];
 #pragma unroll
             for (int corner = 0; corner < 4; ++corner) {
-                // Around the edge, as passes::list_quads.
-                const int turn = goes_out ? corner : (4 - corner) & 3;
-                const int along_b = turn == 0 || turn == 3 ? 1 : 0, along_d = turn < 2 ? 1 : 0;
-                const int dx = b == 0   ? along_b
-                               : d == 0 ? along_d
-                                        : 0,
-                          dy = b == 1   ? along_b
-                               : d == 1 ? along_d
-                                        : 0,
-                          dz = b == 2   ? along_b
-                               : d == 2 ? along_d
-                                        : 0;
-                const int in_word_before = dx != 0 && bit == 0 ? 1 : 0, in_word = (bit - dx) & 31;
-                const surface_word w = all.words[around[in_word_before | dy << 1 | dz << 2][item.word()]];
+                // Around the edge from its lowest cell: (1, 1) (0, 1) (0, 0) (1, 0) as the edge lies in the cell.
+                const int along_b = corner == 0 || corner == 3 ? 1 : 0, along_d = corner < 2 ? 1 : 0;
+                const int back = along_b << b | along_d << d; // the axes, as bits, along which the cell lies before
+                const int in_word = (bit - (back & 1)) & 31;
+                const surface_word w =
+                    all.words[around[(back & 6) | ((back & 1) != 0 && bit == 0 ? 1 : 0)][item.word()]];
                 v[corner] = w.vertex(in_word);
                 if (w.has_several(in_word)) {
                     const int edge =
                         b < d ? core::cell_edge(axis, along_b, along_d) : core::cell_edge(axis, along_d, along_b);
                     v[corner] += all.sheet(w, in_word, edge);
                 }
-                if constexpr (!MakesQuads) { // from the edge's lowest cell on
-                    const surface_vertex at = out.vertices[v[corner]];
-                    places[corner] = {std::int64_t{at.q[0]} - 65536 * dx, std::int64_t{at.q[1]} - 65536 * dy,
-                                      std::int64_t{at.q[2]} - 65536 * dz};
-                }
+                if constexpr (!MakesQuads) places[corner] = place_from::of(out.vertices[v[corner]], back);
+            }
+            if (!goes_out) { // the other way round
+                const std::uint32_t second = v[1];
+                v[1] = v[3];
+                v[3] = second;
+                const place_from second_place = places[1];
+                places[1] = places[3];
+                places[3] = second_place;
             }
             if constexpr (MakesQuads) {
                 out.quads[first + k + threadIdx.x] = glm::uvec4(v[0], v[1], v[2], v[3]);
             } else {
-                const bool from_first = core::is_cut_from_first(places[0], places[1], places[2], places[3], out.folds);
+                const bool from_first = is_cut_from_first(places, out.folds);
                 std::uint32_t* const to = staged + size * threadIdx.x;
                 to[0] = v[0];
                 to[1] = v[1];
@@ -282,144 +272,6 @@ __global__ __launch_bounds__(words_per_block) void list_faces_kernel(const __gri
             copy_staged(reinterpret_cast<std::uint32_t*>(out.triangles + 2 * (first + k)), staged, size * count);
         }
     });
-}
-
-// ---- components -----------------------------------------------------------------------------------------------------
-
-// Joins vertices that an edge of the mesh joins. A row of linked cells is one vertex from the start, and neighbouring
-// rows are joined once for each two that touch.
-struct join_words {
-    surface_words all;
-    core::disjoint_sets<std::uint32_t> sets; // vertices, counted from first_vertex
-    std::uint32_t first_vertex;
-
-    // Joins a word's cells with those before them, as far as is_wanted(i) for the word i that has the other cell.
-    // Returns how many sets became fewer.
-    template <class IsWanted>
-    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t join(std::uint64_t i, const IsWanted& is_wanted) const {
-        const core::passes::surface_word own = all.words[i];
-        const core::passes::cell_key at{all.keys[i]};
-        const int w = at.x() >> 5, y = at.y(), z = at.z();
-        const core::passes::word_faces faces = all.faces[i];
-        std::uint32_t along_x = all.edges[i].faces_x & ~own.linked, fewer = 0;
-        if ((along_x & 1) != 0) {
-            const std::uint32_t before = all.where.find(w - 1, y, z);
-            if (is_wanted(before)) fewer += join_cells(all.words[before], 31, own, 0, 0);
-        }
-        along_x &= ~1u;
-        if (along_x != 0 && is_wanted(i))
-            for (; along_x != 0; along_x &= along_x - 1) {
-                const int bit = exact::lowest_one(along_x);
-                fewer += join_cells(own, bit - 1, own, bit, 0);
-            }
-        for (int axis = 1; axis < 3; ++axis) {
-            const std::uint32_t along = axis == 1 ? faces.y : faces.z;
-            if (along == 0) continue;
-            const std::uint32_t before = axis == 1 ? all.where.find(w, y - 1, z) : all.where.find(w, y, z - 1);
-            if (is_wanted(before)) fewer += join_along(all.words[before], own, along, axis);
-        }
-        return fewer;
-    }
-
-private:
-    // Joins a word and the one before it along y or z through these faces.
-    [[nodiscard]] __device__ VOXELPIPE_INLINE std::uint32_t join_along(const core::passes::surface_word& before,
-                                                                       const core::passes::surface_word& own,
-                                                                       std::uint32_t faces, int axis) const {
-        const std::uint32_t plain = faces & own.single() & before.single(),
-                            known = plain << 1 & own.linked & before.linked; // joined through the cell before
-        std::uint32_t fewer = 0;
-        for (std::uint32_t left = faces & ~(plain & known); left != 0; left &= left - 1) {
-            const int bit = exact::lowest_one(left);
-            fewer += join_cells(before, bit, own, bit, axis);
-        }
-        return fewer;
-    }
-    // Joins the sheets of two cells through the face between them; b is the upper one along `axis`.
-    [[nodiscard]] __device__ std::uint32_t join_cells(const core::passes::surface_word& a, int bit_a,
-                                                      const core::passes::surface_word& b, int bit_b, int axis) const {
-        const bool several_a = a.has_several(bit_a), several_b = b.has_several(bit_b);
-        if (!several_a && !several_b) return join_vertices(row(a, bit_a), row(b, bit_b));
-        const int corners = all.states[b.cell(bit_b)] & 255;
-        std::uint32_t fewer = 0;
-        for (int other = 0; other < 3; ++other) {
-            if (other == axis) continue;
-            for (int side = 0; side < 2; ++side) { // along the third axis
-                const auto edge = [&](int along_axis) {
-                    return axis == core::low_axis(other) ? core::cell_edge(other, along_axis, side)
-                                                         : core::cell_edge(other, side, along_axis);
-                };
-                if (!core::is_crossed(corners, edge(0))) continue;
-                fewer += join_vertices(several_a ? a.vertex(bit_a) + all.sheet(a, bit_a, edge(1)) : row(a, bit_a),
-                                       several_b ? b.vertex(bit_b) + all.sheet(b, bit_b, edge(0)) : row(b, bit_b));
-            }
-        }
-        return fewer;
-    }
-    // The vertex that stands for the row of linked cells of a cell.
-    [[nodiscard]] __device__ static std::uint32_t row(const core::passes::surface_word& w, int bit) {
-        return w.vertex(w.begin_of_links(bit));
-    }
-    [[nodiscard]] __device__ std::uint32_t join_vertices(std::uint32_t v, std::uint32_t u) const {
-        return sets.join(v - first_vertex, u - first_vertex) ? 1 : 0;
-    }
-};
-
-// Vertices of a block that are joined in shared memory. A block with more leaves all to join_blocks_kernel.
-inline constexpr std::uint32_t joined_vertices = 6144;
-
-// Adds to *components what a warp's lanes have; numbers modulo 2^32 with a sign.
-__device__ VOXELPIPE_INLINE void add_components(std::uint64_t* components, std::uint32_t own) {
-    const auto sum = static_cast<std::int32_t>(__reduce_add_sync(0xffffffffu, own));
-    if (threadIdx.x % 32 == 0 && sum != 0)
-        atomicAdd(reinterpret_cast<unsigned long long*>(components),
-                  static_cast<unsigned long long>(std::int64_t{sum}));
-}
-
-// Starts the sets of vertices, joins those of each block's words, and adds what is left to *components.
-template <int = 0>
-__global__ __launch_bounds__(words_per_block) void join_in_blocks_kernel(const __grid_constant__ surface_words all,
-                                                                         std::uint32_t* parents,
-                                                                         std::uint64_t* components) {
-    await_stream();
-    __shared__ std::uint32_t of_block[joined_vertices];
-    const std::uint64_t n = *all.num_words, begin = std::uint64_t{blockIdx.x} * words_per_block,
-                        i = begin + threadIdx.x, end = begin + words_per_block < n ? begin + words_per_block : n;
-    if (begin >= n) return;
-    const std::uint32_t first = all.words[begin].first_vertex, total = all.words[end].first_vertex - first;
-    std::uint32_t left = 0;
-    if (i < n) {
-        const core::passes::surface_word own = all.words[i];
-        left = own.num_vertices() - static_cast<std::uint32_t>(__popc(own.linked));
-    }
-    if (total <= joined_vertices) {
-        for (std::uint32_t k = threadIdx.x; k < total; k += words_per_block) of_block[k] = k;
-        __syncthreads();
-        const join_words pass{all, {of_block}, first};
-        if (i < n) left -= pass.join(i, [&](std::uint64_t other) { return other >= begin; });
-        __syncthreads();
-        for (std::uint32_t k = threadIdx.x; k < total; k += words_per_block)
-            parents[first + k] = first + pass.sets.find(k);
-    } else {
-        for (std::uint32_t k = threadIdx.x; k < total; k += words_per_block) parents[first + k] = first + k;
-    }
-    add_components(components, left);
-}
-
-// Joins what join_in_blocks_kernel has not joined.
-template <int = 0>
-__global__ __launch_bounds__(words_per_block) void join_blocks_kernel(const __grid_constant__ surface_words all,
-                                                                      std::uint32_t* parents,
-                                                                      std::uint64_t* components) {
-    await_stream();
-    const std::uint64_t n = *all.num_words, begin = std::uint64_t{blockIdx.x} * words_per_block,
-                        i = begin + threadIdx.x, end = begin + words_per_block < n ? begin + words_per_block : n;
-    if (begin >= n) return;
-    const bool is_joined = all.words[end].first_vertex - all.words[begin].first_vertex <= joined_vertices;
-    std::uint32_t fewer = 0;
-    if (i < n)
-        fewer = join_words{all, {parents}, 0}.join(i, [&](std::uint64_t other) { return !is_joined || other < begin; });
-    add_components(components, 0 - fewer);
 }
 
 // ---- launches -------------------------------------------------------------------------------------------------------
@@ -440,13 +292,4 @@ void list_faces(const surface_words& all, std::uint32_t blocks, const face_array
     launch_behind(out.quads != nullptr ? list_faces_kernel<true> : list_faces_kernel<false>, blocks, words_per_block,
                   stream, stage::vertex_shade, all, out);
 }
-// Sets *components, which is 0, to the number of components.
-template <int = 0>
-void count_components(const surface_words& all, std::uint32_t blocks, std::uint32_t* parents, std::uint64_t* components,
-                      cudaStream_t stream) {
-    launch_behind(join_in_blocks_kernel<>, blocks, words_per_block, stream, stage::vertex_shade, all, parents,
-                  components);
-    launch_behind(join_blocks_kernel<>, blocks, words_per_block, stream, stage::vertex_shade, all, parents, components);
-}
-
 } // namespace voxelpipe::device

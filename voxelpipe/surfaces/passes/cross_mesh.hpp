@@ -72,11 +72,23 @@ private:
         const snapped_position sample{(p[0] << fraction) + half, (p[1] << fraction) + half, (p[2] << fraction) + half};
 
         place chosen{};
-        if (!choose(s, sample, chosen)) {
+        exact_normal n{};
+        const bool is_one = s.end - s.begin == 1;
+        bool found = false;
+        if (is_one) { // as most are
+            const std::uint32_t triangle = triangles[s.begin];
+            n = normal(triangle);
+            chosen = {position_on_edge(n, mesh.positions[mesh.triangles[triangle].x], sample, Axis, fraction),
+                      triangle};
+            found = changes_verdict(s, sample, chosen);
+        } else if (s.begin != s.end) {
+            found = choose(s, sample, chosen);
+            if (found) n = normal(chosen.triangle);
+        }
+        if (!found) {
             if (is_counted) add_shared(counts[static_cast<int>(edge_count::made)], 1);
             return {};
         }
-        const exact_normal n = normal(chosen.triangle);
         edge_crossing c;
         c.t = round_position(chosen.position);
         set_normal(c, n, Axis, goes_out);
@@ -87,14 +99,16 @@ private:
         return c;
     }
 
+    // Whether the verdict changes at the only crossing of an edge.
+    [[nodiscard]] VOXELPIPE_HD bool changes_verdict(const stretch& s, const snapped_position& sample,
+                                                    const place& only) const {
+        if (each_draw) return verdict(s, sample, &only) != verdict(s, sample, nullptr);
+        const std::int64_t before = winding(s, sample, nullptr, false, 0);
+        return is_inside(rule, before) != is_inside(rule, before + winding_of(keys[s.begin]));
+    }
     // The middle one of an odd number of changes of the verdict; false if their number is even.
     [[nodiscard]] VOXELPIPE_HD bool choose(const stretch& s, const snapped_position& sample, place& chosen) const {
-        if (s.begin == s.end) return false;
         bool inside = verdict(s, sample, nullptr);
-        if (s.end - s.begin == 1) {
-            chosen = at(s.begin, sample);
-            return verdict(s, sample, &chosen) != inside;
-        }
         const bool first_inside = inside;
         std::uint64_t changes = 0;
         place last{};

@@ -114,29 +114,30 @@ struct list_mesh_crossings {
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
         std::uint32_t n = 0;
-        if (i < mesh.count) n = list(i);
+        const std::uint64_t at = places != nullptr ? places[i] : 0;
+        if (i < mesh.count)
+            each(i, [&](std::uint64_t key) {
+                if (places != nullptr) {
+                    keys[at + n] = key;
+                    triangles[at + n] = static_cast<std::uint32_t>(i);
+                }
+                ++n;
+            });
         if (counts != nullptr) counts[i] = n;
     }
-
-private:
-    [[nodiscard]] VOXELPIPE_HD std::uint32_t list(std::uint64_t i) const {
+    // Calls f(key) for the crossings of triangle i.
+    template <class F>
+    VOXELPIPE_HD void each(std::uint64_t i, const F& f) const {
         const glm::uvec3 t = mesh.triangles[i];
         const snapped_position a = mesh.positions[t.x], b = mesh.positions[t.y], c = mesh.positions[t.z];
-        if (classify_positions(a, b, c) != triangle_class::drawn) return 0;
+        if (classify_positions(a, b, c) != triangle_class::drawn) return;
         const row_box box = rows_within<Axis>(a, b, c, fraction, whole);
-        if (box.empty()) return 0;
-        std::uint32_t n = 0;
-        const std::uint64_t at = places != nullptr ? places[i] : 0;
+        if (box.empty()) return;
         for_each_crossing<Axis, centre_offset<>>(a, b, c, fraction, box,
                                                  [&](std::int64_t u, std::int64_t v, std::int64_t first, int winding) {
-                                                     if (first > rows.samples) return;
-                                                     if (places != nullptr) {
-                                                         keys[at + n] = rows.key(rows.row(u, v), first, winding < 0);
-                                                         triangles[at + n] = static_cast<std::uint32_t>(i);
-                                                     }
-                                                     ++n;
+                                                     if (first <= rows.samples)
+                                                         f(rows.key(rows.row(u, v), first, winding < 0));
                                                  });
-        return n;
     }
 };
 

@@ -79,12 +79,20 @@ struct word_groups {
         return static_cast<std::uint32_t>(cells.row_words() + 31) / 32;
     }
     [[nodiscard]] VOXELPIPE_HD std::uint64_t count() const { return cells.rows() * groups(); }
-    // Number of word w of a row, which has a cell; w is not negative.
-    [[nodiscard]] VOXELPIPE_HD std::uint32_t find(int w, int y, int z) const {
+    // A word: the number of words with a cell before it, which is its own where it has one.
+    struct place {
+        std::uint32_t number;
+        bool exists;
+    };
+    // Word w of a row; w is not negative.
+    [[nodiscard]] VOXELPIPE_HD place look(int w, int y, int z) const {
         const std::uint64_t group = cells.row(y, z) * groups() + static_cast<std::uint32_t>(w >> 5);
-        const std::uint32_t below = masks[group] & surface_word::below(w & 31);
-        return static_cast<std::uint32_t>(first[group]) + static_cast<std::uint32_t>(exact::count_ones(below));
+        const std::uint32_t mask = masks[group], below = mask & surface_word::below(w & 31);
+        return {static_cast<std::uint32_t>(first[group]) + static_cast<std::uint32_t>(exact::count_ones(below)),
+                (mask >> (w & 31) & 1) != 0};
     }
+    // Number of a word that has a cell.
+    [[nodiscard]] VOXELPIPE_HD std::uint32_t find(int w, int y, int z) const { return look(w, y, z).number; }
 };
 
 // Finds cells by their word.
