@@ -117,7 +117,7 @@ template <class Mesh, class VertexShader, class Shader>
             bodies.emplace(cpu::make_solid_geometry(how, draws, g, glm::ivec3(0), solid));
             if (has_cones(options.repair) && !cpu::add_cones(*bodies, solid, result.solid))
                 return cpu::solid_failure(status_code::too_many_triangles, *bodies);
-            if (options.repair == repair::winding) trees = cpu::make_winding_trees(*bodies);
+            if (options.repair == repair::winding) trees = cpu::make_winding_trees(how, *bodies);
             body_tree = std::make_unique<cpu::triangle_tree>(how, *bodies, cpu::reach_of(options, g),
                                                              triple<std::int64_t>{}, scale);
             num_bodies = *std::max_element(bodies->body.begin(), bodies->body.end()) + std::size_t{1};

@@ -10,6 +10,7 @@
 #include <voxelpipe/solid/core/winding_lids.hpp>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -39,19 +40,19 @@ namespace voxelpipe::cpu {
 }
 
 // The trees of each body's holes.
-[[nodiscard]] inline std::vector<core::winding_tree> make_winding_trees(const solid_geometry& s) {
+[[nodiscard]] inline std::vector<core::winding_tree> make_winding_trees(const execution& how, const solid_geometry& s) {
     const core::distance_scale scale = core::make_distance_scale(s.where.voxel_size, s.snap.fraction);
     std::vector<core::winding_tree> trees;
     trees.reserve(s.cones.size());
-    for (const core::hole_cones& cones : s.cones) trees.emplace_back(cones, scale);
+    for (const core::hole_cones& cones : s.cones) trees.emplace_back(cones, scale, how.threads);
     return trees;
 }
 
-// What meets the bricks of a body that has holes, and which samples lie on its cones.
+// What meets the bricks of a body that has holes, which samples lie on its cones, and where rows decide.
 class winding_bricks {
 public:
     winding_bricks() = default;
-    winding_bricks(const execution& how, const solid_geometry& s, std::uint32_t body)
+    winding_bricks(const execution& how, const solid_geometry& s, std::uint32_t body, const core::winding_view& tree)
         : extent_{{s.where.extent.x, s.where.extent.y, s.where.extent.z}}, count_(core::bricks_of(extent_)),
           marks_(static_cast<std::size_t>(count_[0] * count_[1] * count_[2])) {
         for (std::size_t p = 0; p < s.parts.size(); ++p)
@@ -62,7 +63,10 @@ public:
             marks_[brick(static_cast<std::int64_t>(i % x) / side, static_cast<std::int64_t>(i / x % y) / side,
                          static_cast<std::int64_t>(i / x / y) / side)] |= core::has_samples_on_cones;
         }
+        find_boxes_of_rows(how, tree, s.snap.fraction);
     }
+    // True if the cones cover less than half from the voxel's box: rows decide.
+    [[nodiscard]] bool is_of_rows(const glm::ivec3& voxel) const { return is_of_rows_[box(voxel)] != 0; }
     // The marks of the brick with this voxel.
     [[nodiscard]] unsigned marks(const glm::ivec3& voxel) const {
         return marks_[brick(voxel.x / side, voxel.y / side, voxel.z / side)];
@@ -76,6 +80,36 @@ private:
 
     [[nodiscard]] std::size_t brick(std::int64_t x, std::int64_t y, std::int64_t z) const {
         return static_cast<std::size_t>((z * count_[1] + y) * count_[0] + x);
+    }
+    static constexpr int box_side = core::small_winding_box;
+    [[nodiscard]] int boxes(int axis) const { return static_cast<int>((extent_[axis] + box_side - 1) / box_side); }
+    [[nodiscard]] std::size_t box(const glm::ivec3& voxel) const {
+        const glm::ivec3 b = voxel / box_side;
+        return (static_cast<std::size_t>(b.z) * static_cast<std::size_t>(boxes(1)) + static_cast<std::size_t>(b.y)) *
+                   static_cast<std::size_t>(boxes(0)) +
+               static_cast<std::size_t>(b.x);
+    }
+    // Large boxes, and the small ones of those that are not decided.
+    void find_boxes_of_rows(const execution& how, const core::winding_view& tree, int fraction) {
+        const int extent[3] = {static_cast<int>(extent_[0]), static_cast<int>(extent_[1]),
+                               static_cast<int>(extent_[2])};
+        is_of_rows_.resize(static_cast<std::size_t>(boxes(0)) * static_cast<std::size_t>(boxes(1)) *
+                           static_cast<std::size_t>(boxes(2)));
+        constexpr int large = core::large_winding_box;
+        const auto is_decided = [&](const glm::ivec3& v, int box) {
+            return core::is_below_half(tree, core::winding_samples::of_box({v.x, v.y, v.z}, box, extent, fraction));
+        };
+        const auto rows = [&](int axis) { return static_cast<std::size_t>((extent[axis] + large - 1) / large); };
+        parallel_for(how.threads, rows(1) * rows(2), [&](unsigned, std::size_t row) {
+            const int y0 = static_cast<int>(row % rows(1)) * large, z0 = static_cast<int>(row / rows(1)) * large;
+            for (int x0 = 0; x0 < extent[0]; x0 += large) {
+                const bool whole = is_decided({x0, y0, z0}, large);
+                for (int z = z0; z < std::min(z0 + large, extent[2]); z += box_side)
+                    for (int y = y0; y < std::min(y0 + large, extent[1]); y += box_side)
+                        for (int x = x0; x < std::min(x0 + large, extent[0]); x += box_side)
+                            is_of_rows_[box({x, y, z})] = whole || is_decided({x, y, z}, box_side) ? 1 : 0;
+            }
+        });
     }
     [[nodiscard]] std::uint64_t sample(std::int64_t x, std::int64_t y, std::int64_t z) const {
         return static_cast<std::uint64_t>((z * extent_[1] + y) * extent_[0] + x);
@@ -108,7 +142,7 @@ private:
     }
 
     core::triple<std::int64_t> extent_{}, count_{};
-    std::vector<std::uint8_t> marks_;
+    std::vector<std::uint8_t> marks_, is_of_rows_;
     std::vector<std::uint64_t> on_cones_; // ascending
 };
 
@@ -171,15 +205,14 @@ private:
     // Decides the voxels of the brick that begins there.
     void judge(const core::winding_view& tree, const winding_bricks& bricks, const glm::ivec3& brick) {
         const glm::ivec3 begin = glm::max(brick, s_.lead), end = glm::min(brick + side, s_.where.extent);
-        if (begin.y >= end.y || begin.z >= end.z) return;
+        if (begin.y >= end.y || begin.z >= end.z || bricks.is_of_rows(brick)) return;
         const unsigned marks = bricks.marks(brick);
-        const auto at = [&](int i) { return (2 * std::int64_t{i} + 1) << (s_.snap.fraction - 1); };
-        const core::winding_samples samples{{at(begin.x), at(begin.y), at(begin.z)},
-                                            {end.x - begin.x, end.y - begin.y, end.z - begin.z},
-                                            std::int64_t{1} << s_.snap.fraction};
+        const core::winding_samples samples =
+            core::winding_samples::of_box({begin.x, begin.y, begin.z}, side, {end.x, end.y, end.z}, s_.snap.fraction);
         const glm::ivec3 middle = begin + glm::ivec3(samples.middle(0), samples.middle(1), samples.middle(2));
         const std::size_t m = row(middle) * stride_ + static_cast<std::size_t>(middle.x);
-        const core::winding_verdict known = core::judge_brick(tree, samples, windings_[m], of_cones_[m], marks, rule_);
+        const core::winding_verdict known =
+            core::judge_brick(tree, samples, windings_[m], of_cones_[m], marks, rule_, near_holes_.data());
         if (known.kind == core::winding_verdict::beyond && known.whole == 0) return; // as the bits are
         for (int z = begin.z; z < end.z; ++z)
             for (int y = begin.y; y < end.y; ++y)
@@ -191,7 +224,8 @@ private:
                                                       bricks.is_on_cone(voxel)};
                     std::uint32_t& word = bits_[r * words_ + i / 32];
                     const std::uint32_t bit = 1u << i % 32;
-                    word = core::judge_sample(tree, samples, known, x - begin.x, y - begin.y, z - begin.z, of, rule_)
+                    word = core::judge_sample(tree, samples, known, near_holes_.data(), x - begin.x, y - begin.y,
+                                              z - begin.z, of, rule_)
                                ? word | bit
                                : word & ~bit;
                 }
@@ -203,6 +237,7 @@ private:
     std::vector<std::int32_t> windings_, of_cones_; // of draws and cones, and of cones alone
     std::size_t words_;
     std::vector<std::uint32_t> bits_;
+    std::array<std::uint32_t, core::near_holes::most> near_holes_{}; // of the brick that is judged
 };
 
 // The voxels of each body whose generalized winding number is inside. sorted: the crossings of draws and cones.
@@ -212,10 +247,10 @@ template <class Crossing>
     const raw_array<Crossing> of_cones = find_crossings<Crossing>(how, keep_parts(s, true), false).crossings;
     how.enter(stage::fine_raster);
     const stopwatch watch(how.times, &stage_times::fine_raster);
-    const std::vector<core::winding_tree> trees = make_winding_trees(s);
+    const std::vector<core::winding_tree> trees = make_winding_trees(how, s);
     std::vector<winding_bricks> bricks(trees.size());
     for (std::uint32_t body = 0; body < trees.size(); ++body)
-        if (trees[body].view().num_triangles != 0) bricks[body] = winding_bricks(how, s, body);
+        if (trees[body].view().num_triangles != 0) bricks[body] = winding_bricks(how, s, body, trees[body].view());
     const row_numbers rows(s.where.extent);
     std::vector<beam_words> beams = all_beams(rows);
     std::vector<solid_counters> of_beam(beams.size());

@@ -94,7 +94,8 @@ TEST(WindingTree, SamplesHaveTheVerdictsOfTheWholeSum) {
             const int bits = core::angle_bits(view.num_triangles);
             const double sum =
                 std::ldexp(static_cast<double>(core::sum_angles(view, p, bits, 0, view.num_triangles, is_on)), -bits);
-            ASSERT_NEAR(static_cast<double>(core::lids_below(view, p) - s.k_cones) - lids.turns + sum, 0.0, lids.error)
+            ASSERT_NEAR(static_cast<double>(core::lids_below(view, p, s.k_cones) - s.k_cones) - lids.turns + sum, 0.0,
+                        lids.error)
                 << "lids and cones close the same holes";
         }
         EXPECT_EQ(on_cones > 0, m == &flat);
@@ -155,8 +156,9 @@ TEST(WindingTree, BricksDecideTheirSamplesAsTheWholeSumDoes) {
             const auto known = [&](int x, int y, int z) { return m->sample(samples.at(x, y, z)); };
             const core::winding_sample middle = known(samples.middle(0), samples.middle(1), samples.middle(2));
             const vp::fill_rule rule = i % 2 == 0 ? vp::fill_rule::nonzero : vp::fill_rule::positive;
-            const verdict brick =
-                core::judge_brick(view, samples, middle.k, middle.k_cones, marks[static_cast<std::size_t>(i)], rule);
+            std::uint32_t near[core::near_holes::most];
+            const verdict brick = core::judge_brick(view, samples, middle.k, middle.k_cones,
+                                                    marks[static_cast<std::size_t>(i)], rule, near);
             ++of_kind[brick.kind];
             const bool is_rare = brick.kind != verdict::outside && brick.kind != verdict::inside &&
                                  !(brick.kind == verdict::beyond && brick.whole == 0);
@@ -165,7 +167,7 @@ TEST(WindingTree, BricksDecideTheirSamplesAsTheWholeSumDoes) {
                 for (int k = 0; k < 3; ++k)
                     q[k] = static_cast<int>(random.below(static_cast<std::uint64_t>(samples.count[k])));
                 const core::winding_sample s = known(q[0], q[1], q[2]);
-                ASSERT_EQ(core::judge_sample(view, samples, brick, q[0], q[1], q[2], s, rule),
+                ASSERT_EQ(core::judge_sample(view, samples, brick, near, q[0], q[1], q[2], s, rule),
                           m->is_inside(samples.at(q[0], q[1], q[2]), s.k, rule))
                     << i << " kind " << brick.kind;
             }

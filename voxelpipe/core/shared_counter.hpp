@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// Words that many threads change, on the host or on the device. Only operations whose result does not depend on the
-// order.
+// Words that many threads change, on the host or on the device.
 
 #include <voxelpipe/config.hpp>
 #include <voxelpipe/core/bisect.hpp>
@@ -18,6 +17,22 @@ VOXELPIPE_HD inline void add_shared(std::uint64_t& to, std::uint64_t n) {
     atomicAdd(reinterpret_cast<unsigned long long*>(&to), static_cast<unsigned long long>(n));
 #else
     std::atomic_ref(to).fetch_add(n, std::memory_order_relaxed);
+#endif
+}
+
+// The same; returns what it was before, so that each caller gets places of its own.
+[[nodiscard]] VOXELPIPE_HD inline std::uint64_t fetch_add_shared(std::uint64_t& to, std::uint64_t n) {
+#if defined(__CUDA_ARCH__)
+    return atomicAdd(reinterpret_cast<unsigned long long*>(&to), static_cast<unsigned long long>(n));
+#else
+    return std::atomic_ref(to).fetch_add(n, std::memory_order_relaxed);
+#endif
+}
+[[nodiscard]] VOXELPIPE_HD inline std::uint32_t exchange_shared(std::uint32_t& to, std::uint32_t value) {
+#if defined(__CUDA_ARCH__)
+    return atomicExch(&to, value);
+#else
+    return std::atomic_ref(to).exchange(value, std::memory_order_relaxed);
 #endif
 }
 

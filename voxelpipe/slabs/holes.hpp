@@ -98,7 +98,7 @@ public:
             const edge& e = left[static_cast<std::size_t>(v / 2)];
             return v % 2 == 0 ? e.low : e.high;
         };
-        return core::close_boundary(boundary, position, max_hole_edges);
+        return core::close_boundary(core::weld_edges(boundary, position), max_hole_edges);
     }
 
 private:

@@ -212,9 +212,12 @@ private:
         run(vertices_, hash_places{positions_, keys_[0], order_[0]}, stream);
         int at = sort(vertices_, place_key_bits, stream);
         run(vertices_, name_places{positions_, keys_[at], order_[at], vertices_, names_}, stream);
-        run(edges, key_edges{indices_, names_, name_bits(), keys_[0], order_[0]}, stream);
+        const body_triangles all{{indices_, static_cast<std::uint32_t>(triangles_), 0},
+                                 static_cast<std::uint32_t>(triangles_),
+                                 static_cast<std::uint32_t>(vertices_)};
+        run(edges, key_edges{all, names_, name_bits(), keys_[0], order_[0]}, stream);
         at = sort(edges, 2 * name_bits(), stream);
-        run(edges, count_unmatched_edges{keys_[at], order_[at], edges, name_bits(), state_->counts}, stream);
+        run(edges, count_unmatched_edges{{keys_[at], order_[at], edges, name_bits()}, state_->counts}, stream);
     }
     [[nodiscard]] int key_bits() const {
         return static_cast<int>(std::bit_width(static_cast<std::uint64_t>(num_keys_)));

@@ -7,6 +7,7 @@
 
 #include <voxelpipe/cells/passes/cell_source.hpp>
 #include <voxelpipe/solid/core/holes.hpp>
+#include <voxelpipe/solid/passes/find_boundary.hpp>
 #include <voxelpipe/surfaces/passes/mesh_rows.hpp>
 
 #include <algorithm>
@@ -100,7 +101,7 @@ public:
     [[nodiscard]] std::uint64_t num_vertices() const { return positions_.size(); }
     [[nodiscard]] std::uint64_t num_triangles() const { return triangles_.size(); }
 
-    // Adds the cones that close the holes of each body, found on the host. Throws as core::close_holes.
+    // Adds the cones that close the holes of each body. Throws as find_boundary() and close_boundary().
     void close_holes(bodies each, std::uint64_t max_hole_edges, cell_counters& counts) {
         add_cones(find_cones(each, max_hole_edges), counts);
     }
@@ -129,11 +130,11 @@ public:
         const int bits = static_cast<int>(std::bit_width(vertices)); // vertices are fewer than 2^32
         buffer<std::uint64_t> keys(backend_, edges);
         buffer<std::uint32_t> directions(backend_, edges);
-        backend_.for_each(edges,
-                          passes::key_edges{triangles_.data(), names.data(), bits, keys.data(), directions.data()});
+        const auto all = triangles_of(0, triangles_.size(), 0, vertices);
+        backend_.for_each(edges, passes::key_edges{all, names.data(), bits, keys.data(), directions.data()});
         backend_.sort_by_key(keys, directions, 2 * bits);
         backend_.for_each(edges,
-                          passes::count_unmatched_edges{keys.data(), directions.data(), edges, bits, counts_.data()});
+                          passes::count_unmatched_edges{{keys.data(), directions.data(), edges, bits}, counts_.data()});
     }
 
     // The number of vertices through all draws and instances.
@@ -146,28 +147,30 @@ public:
 
 private:
     [[nodiscard]] std::vector<hole_cones> find_cones(bodies each, std::uint64_t max_hole_edges) {
-        const std::vector<snapped_position> positions = positions_.to_host(backend_);
-        std::vector<glm::uvec3> triangles = triangles_.to_host(backend_);
-        std::vector<hole_part> parts;
-        for (std::size_t d = 0; d + 1 < begins_.size(); ++d) {
-            const part_begin from = begins_[d], to = begins_[d + 1];
-            const auto vertices = static_cast<std::size_t>(to.vertex - from.vertex),
-                       count = static_cast<std::size_t>(to.triangle - from.triangle);
-            // Bad indices are those of vertex 0, and no vertex of the draw then, or three times the same one.
-            for (std::uint64_t i = from.triangle; i < to.triangle; ++i)
-                triangles[i] -= glm::uvec3(static_cast<std::uint32_t>(from.vertex));
-            parts.push_back({positions.data() + from.vertex, vertices,
-                             instanced_triangles{triangles.data() + from.triangle, static_cast<std::uint32_t>(count),
-                                                 static_cast<std::uint32_t>(vertices)},
-                             count});
-        }
         std::vector<hole_cones> cones;
-        if (each == bodies::draw) {
-            for (const hole_part& p : parts) cones.push_back(core::close_holes({p}, max_hole_edges));
-        } else {
-            cones.push_back(core::close_holes(parts, max_hole_edges));
-        }
+        const auto close = [&](std::size_t first, std::size_t last) {
+            const part_begin from = begins_[first], to = begins_[last];
+            // Bad indices are those of vertex 0, and no vertex of the draws then, or three times the same one.
+            const passes::body_triangles body = triangles_of(from.triangle, to.triangle, from.vertex, to.vertex);
+            cones.push_back(core::close_boundary(
+                find_boundary(backend_, positions_.data() + from.vertex, to.vertex - from.vertex, {&body, 1}),
+                max_hole_edges));
+        };
+        const std::size_t draws = begins_.size() - 1;
+        if (each == bodies::draw)
+            for (std::size_t d = 0; d < draws; ++d) close(d, d + 1);
+        else
+            close(0, draws);
         return cones;
+    }
+    // Triangles whose vertices are numbered through all draws: [first, last), of these vertices.
+    [[nodiscard]] passes::body_triangles triangles_of(std::uint64_t first, std::uint64_t last,
+                                                      std::uint64_t first_vertex, std::uint64_t last_vertex) const {
+        const auto count = static_cast<std::uint32_t>(last - first);
+        return {{triangles_.data() + first, count, 0},
+                count,
+                static_cast<std::uint32_t>(last_vertex - first_vertex),
+                static_cast<std::uint32_t>(first_vertex)};
     }
     void add_cones(std::vector<hole_cones>&& cones, cell_counters& counts) {
         std::uint64_t vertices = positions_.size(), count = triangles_.size();

@@ -9,6 +9,7 @@
 #include <voxelpipe/core/primitive.hpp>
 #include <voxelpipe/core/shared_counter.hpp>
 #include <voxelpipe/programs/elements.hpp>
+#include <voxelpipe/solid/passes/edge_passes.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -112,98 +113,13 @@ struct join_triangles {
 
 // ---- open edges -----------------------------------------------------------------------------------------------------
 
-[[nodiscard]] VOXELPIPE_HD inline bool is_same_place(const snapped_position& a, const snapped_position& b) {
-    return a.x == b.x && a.y == b.y && a.z == b.z;
-}
-
-// Vertices get the names of their places first: edges are pairs of names then, and equal ones are found without a look
-// at the vertices.
-
-inline constexpr int place_key_bits = 39;
-inline constexpr std::uint32_t no_place = ~std::uint32_t{0}; // of a vertex that cannot be drawn
-
-struct hash_places {
-    const snapped_position* positions;
-    std::uint64_t* keys;
-    std::uint32_t* order;
-
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const snapped_position p = positions[i];
-        std::uint64_t h = 0;
-        const auto mix = [&](std::int64_t v) {
-            h = (h ^ static_cast<std::uint64_t>(v)) * 0x9e3779b97f4a7c15u;
-            h ^= h >> 29;
-        };
-        mix(p.x);
-        mix(p.y);
-        mix(p.z);
-        keys[i] = h * 0xbf58476d1ce4e5b9u >> (64 - place_key_bits);
-        order[i] = static_cast<std::uint32_t>(i);
-    }
-};
-
-// Names the vertices of each run of equal keys: after one vertex of those at the same place.
-struct name_places {
-    const snapped_position* positions;
-    const std::uint64_t* keys;
-    const std::uint32_t* order;
-    std::uint64_t count;
-    std::uint32_t* names;
-
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        if (i != 0 && keys[i] == keys[i - 1]) return;
-        for (std::uint64_t at = i; at < count && keys[at] == keys[i]; ++at) {
-            const std::uint32_t vertex = order[at];
-            const snapped_position p = positions[vertex];
-            names[vertex] = vertex;
-            if (!is_drawable(p)) names[vertex] = no_place;
-            for (std::uint64_t before = i; before < at && names[vertex] == vertex; ++before)
-                if (names[order[before]] == order[before] && is_same_place(positions[order[before]], p))
-                    names[vertex] = order[before];
-        }
-    }
-};
-
-// The key of edge i % 3 of triangle i / 3: the names of its ends, `bits` each, the lower one first; and 1 if the
-// triangle runs from that one to the other.
-struct key_edges {
-    const glm::uvec3* triangles;
-    const std::uint32_t* names;
-    int bits; // 2^bits - 1 names no vertex
-    std::uint64_t* keys;
-    std::uint32_t* directions;
-
-    VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const glm::uvec3 t = triangles[i / 3];
-        const std::uint32_t n[3] = {names[t.x], names[t.y], names[t.z]};
-        const auto e = static_cast<int>(i % 3);
-        const std::uint64_t from = n[e], to = n[e == 2 ? 0 : e + 1];
-        const bool is_edge = n[0] != no_place && n[1] != no_place && n[2] != no_place && from != to;
-        const std::uint64_t none = (std::uint64_t{1} << bits) - 1;
-        const std::uint64_t low = !is_edge    ? none
-                                  : from < to ? from
-                                              : to,
-                            high = !is_edge    ? none
-                                   : from < to ? to
-                                               : from;
-        keys[i] = low << bits | high;
-        directions[i] = from < to ? 1 : 0;
-    }
-};
-
-// Adds up the directions of equal edges, at the first of each run of equal keys.
+// Counts the edges that are left, at the first of each run of equal ones.
 struct count_unmatched_edges {
-    const std::uint64_t* keys;
-    const std::uint32_t* directions;
-    std::uint64_t count;
-    int bits;
+    sorted_edges in;
     std::uint64_t* counts;
 
     VOXELPIPE_HD void operator()(std::uint64_t i) const {
-        const std::uint64_t key = keys[i];
-        if (key >> bits == (std::uint64_t{1} << bits) - 1 || (i != 0 && keys[i - 1] == key)) return;
-        std::int64_t sum = 0;
-        for (std::uint64_t at = i; at < count && keys[at] == key; ++at) sum += directions[at] != 0 ? 1 : -1;
+        const std::int64_t sum = in.sum_from(i);
         add_count(counts, cell_count::open_edges, static_cast<std::uint64_t>(sum < 0 ? -sum : sum));
     }
 };

@@ -13,6 +13,7 @@
 
 #include <voxelpipe/core/fixed_point.hpp>
 #include <voxelpipe/core/instances.hpp>
+#include <voxelpipe/core/radix_order.hpp>
 
 #include <glm/vec3.hpp>
 
@@ -34,6 +35,7 @@ struct hole_part {
     std::size_t num_vertices;
     instanced_triangles triangles;
     std::size_t num_triangles; // of all instances
+    std::uint32_t least = 0;   // index of the first vertex
 };
 
 struct hole_cones {
@@ -90,81 +92,72 @@ private:
     std::vector<std::uint64_t> ends_;         // the higher vertex, and whether the edge comes down from it
 };
 
-// The cones over the boundary of a set of triangles. `unwelded`: edges that are left once some opposite ones have
-// cancelled; position(v): where their vertex v is. Throws as close_holes().
-template <class Position>
-[[nodiscard]] hole_cones close_boundary(const std::vector<edge_chain::edge>& unwelded, const Position& position,
-                                        std::uint64_t max_hole_edges) {
-    // The vertices of what is left, welded by position: their numbers are their ranks.
-    struct vertex {
-        snapped_position p;
-        std::uint64_t number;
-    };
-    const auto same = [](const snapped_position& a, const snapped_position& b) {
-        return a.x == b.x && a.y == b.y && a.z == b.z;
-    };
-    std::vector<std::uint64_t> used;
-    for (const auto& e : unwelded) used.insert(used.end(), {e.from, e.to});
-    std::sort(used.begin(), used.end());
-    used.erase(std::unique(used.begin(), used.end()), used.end());
-    std::vector<vertex> sorted;
-    sorted.reserve(used.size());
-    for (std::size_t i = 0; i < used.size(); ++i) sorted.push_back({position(used[i]), i});
-    std::sort(sorted.begin(), sorted.end(), [](const vertex& a, const vertex& b) {
-        return a.p.x != b.p.x ? a.p.x < b.p.x : a.p.y != b.p.y ? a.p.y < b.p.y : a.p.z < b.p.z;
-    });
-    std::vector<std::uint64_t> rank(used.size());
-    std::vector<snapped_position> welded;
-    for (const vertex& v : sorted) {
-        if (welded.empty() || !same(welded.back(), v.p)) welded.push_back(v.p);
-        rank[v.number] = welded.size() - 1;
-    }
-    const auto number = [&](std::uint64_t v) {
-        return rank[static_cast<std::size_t>(std::lower_bound(used.begin(), used.end(), v) - used.begin())];
-    };
-    edge_chain chain(welded.size());
-    for (const auto& e : unwelded) chain.count(number(e.from), number(e.to));
-    chain.start();
-    for (const auto& e : unwelded) chain.add(number(e.from), number(e.to));
-    const std::vector<edge_chain::edge> boundary = chain.boundary();
+// The boundary of a set of triangles, welded by position: vertices in order of x, then y, then z, no two at the same
+// place, and edges by their lower vertex, then the higher one, each as often as it is left.
+struct hole_boundary {
+    std::vector<snapped_position> positions;
+    std::vector<edge_chain::edge> edges;
+};
 
+// Leaves out vertices that have no edge, because all of theirs have cancelled.
+inline void drop_unused(hole_boundary& b) {
+    std::vector<std::uint32_t> name(b.positions.size());
+    for (const auto& e : b.edges) name[e.from] = name[e.to] = 1;
+    std::size_t kept = 0;
+    for (std::size_t v = 0; v < name.size(); ++v) {
+        if (name[v] == 0) continue;
+        b.positions[kept] = b.positions[v];
+        name[v] = static_cast<std::uint32_t>(kept++);
+    }
+    if (kept == name.size()) return;
+    b.positions.resize(kept);
+    for (auto& e : b.edges) e = {name[e.from], name[e.to]};
+}
+
+// The cones over a boundary. Throws std::bad_alloc, or std::length_error for more than 2^32 boundary vertices.
+[[nodiscard]] inline hole_cones close_boundary(hole_boundary&& boundary, std::uint64_t max_hole_edges) {
+    const auto too_many = [] { throw std::length_error("voxelpipe: more boundary vertices than triangles can name"); };
+    if (boundary.positions.size() > std::numeric_limits<std::uint32_t>::max()) too_many();
     // Components, each with its least vertex as its root.
-    std::vector<std::uint64_t> parent(welded.size());
-    std::iota(parent.begin(), parent.end(), std::uint64_t{0});
-    const auto root = [&](std::uint64_t v) {
+    std::vector<std::uint32_t> parent(boundary.positions.size());
+    std::iota(parent.begin(), parent.end(), std::uint32_t{0});
+    const auto root = [&](std::uint64_t of) {
+        auto v = static_cast<std::uint32_t>(of);
         while (parent[v] != v) v = parent[v] = parent[parent[v]];
         return v;
     };
-    for (const auto& e : boundary) {
-        const std::uint64_t a = root(e.from), b = root(e.to);
+    for (const auto& e : boundary.edges) {
+        const std::uint32_t a = root(e.from), b = root(e.to);
         parent[std::max(a, b)] = std::min(a, b);
     }
     struct component {
         std::uint64_t edges = 0;
-        std::uint64_t vertices = 0; // distinct ones
+        std::uint64_t vertices = 0;
         int128 sum[3] = {0, 0, 0};
         std::uint32_t apex = 0;
     };
-    std::vector<component> components(welded.size()); // at their roots
-    std::vector<bool> on_boundary(welded.size());
-    for (const auto& e : boundary) {
-        ++components[root(e.from)].edges;
-        on_boundary[e.from] = on_boundary[e.to] = true;
-    }
-    for (std::size_t v = 0; v < welded.size(); ++v) {
-        if (!on_boundary[v]) continue;
-        component& c = components[root(v)];
+    std::vector<component> components;
+    // A vertex's root is not above it, and has its component's number already.
+    std::vector<std::uint32_t> number(parent.size());
+    for (std::uint32_t v = 0; v < parent.size(); ++v) {
+        const std::uint32_t r = root(v);
+        if (r == v) {
+            number[v] = static_cast<std::uint32_t>(components.size());
+            components.emplace_back();
+        }
+        number[v] = number[r];
+        component& c = components[number[v]];
         ++c.vertices;
-        c.sum[0] += welded[v].x;
-        c.sum[1] += welded[v].y;
-        c.sum[2] += welded[v].z;
+        c.sum[0] += boundary.positions[v].x;
+        c.sum[1] += boundary.positions[v].y;
+        c.sum[2] += boundary.positions[v].z;
     }
+    for (const auto& e : boundary.edges) ++components[number[e.from]].edges;
     hole_cones out;
-    out.edges = boundary.size();
-    out.positions = welded;
+    out.edges = boundary.edges.size();
+    out.holes = components.size();
+    out.positions = std::move(boundary.positions);
     for (component& c : components) {
-        if (c.edges == 0) continue;
-        ++out.holes;
         if (c.edges > max_hole_edges) continue;
         ++out.cones;
         // The mean of the vertices, to the nearest unit: floor((2 s + m) / (2 m)).
@@ -172,17 +165,61 @@ template <class Position>
         const auto mean = [&](int128 s) {
             return static_cast<std::int64_t>(exact::floor_div<int128>(2 * s + m, 2 * m));
         };
-        if (out.positions.size() > std::numeric_limits<std::uint32_t>::max())
-            throw std::length_error("voxelpipe: more boundary vertices than triangles can name");
+        if (out.positions.size() > std::numeric_limits<std::uint32_t>::max()) too_many();
         c.apex = static_cast<std::uint32_t>(out.positions.size());
         out.positions.push_back({mean(c.sum[0]), mean(c.sum[1]), mean(c.sum[2])});
     }
-    for (const auto& e : boundary) {
-        const component& c = components[root(e.from)];
+    out.triangles.reserve(boundary.edges.size());
+    for (const auto& e : boundary.edges) {
+        const component& c = components[number[e.from]];
         if (c.edges <= max_hole_edges)
             out.triangles.push_back({static_cast<std::uint32_t>(e.to), static_cast<std::uint32_t>(e.from), c.apex});
     }
     return out;
+}
+
+// Welds edges that are left once some opposite ones have cancelled. position(v): where their vertex v is. Throws as
+// close_boundary().
+template <class Position>
+[[nodiscard]] hole_boundary weld_edges(const std::vector<edge_chain::edge>& edges, const Position& position) {
+    // End 2 i is where edge i begins, and the next one where it ends.
+    if (edges.size() > std::numeric_limits<std::uint32_t>::max() / 2)
+        throw std::length_error("voxelpipe: more boundary vertices than triangles can name");
+    const auto vertex_of = [&](std::uint32_t end) { return end % 2 == 0 ? edges[end / 2].from : edges[end / 2].to; };
+    radix_order ends(2 * edges.size());
+    ends.sort(vertex_of);
+    // Vertices, each once.
+    std::vector<std::uint32_t> used(2 * edges.size()); // by end
+    std::vector<snapped_position> places;
+    for (std::size_t i = 0; i < ends.items().size(); ++i) {
+        const std::uint32_t end = ends.items()[i];
+        if (i == 0 || vertex_of(end) != vertex_of(ends.items()[i - 1])) places.push_back(position(vertex_of(end)));
+        used[end] = static_cast<std::uint32_t>(places.size() - 1);
+    }
+    radix_order sorted(places.size());
+    sorted.sort([&](std::uint32_t v) { return places[v].z; });
+    sorted.sort([&](std::uint32_t v) { return places[v].y; });
+    sorted.sort([&](std::uint32_t v) { return places[v].x; });
+    // Names of places, in their order.
+    std::vector<std::uint32_t> name(places.size());
+    hole_boundary welded;
+    for (const std::uint32_t v : sorted.items()) {
+        const snapped_position& p = places[v];
+        if (welded.positions.empty() || welded.positions.back().x != p.x || welded.positions.back().y != p.y ||
+            welded.positions.back().z != p.z)
+            welded.positions.push_back(p);
+        name[v] = static_cast<std::uint32_t>(welded.positions.size() - 1);
+    }
+    edge_chain chain(welded.positions.size());
+    const auto for_each_edge = [&](auto&& visit) {
+        for (std::size_t i = 0; i < edges.size(); ++i) visit(name[used[2 * i]], name[used[2 * i + 1]]);
+    };
+    for_each_edge([&](std::uint64_t a, std::uint64_t b) { chain.count(a, b); });
+    chain.start();
+    for_each_edge([&](std::uint64_t a, std::uint64_t b) { chain.add(a, b); });
+    welded.edges = chain.boundary();
+    drop_unused(welded);
+    return welded;
 }
 
 // The edges of one body that are left when opposite ones of the same two vertices have cancelled: all its triangles, in
@@ -196,7 +233,8 @@ template <class Position>
         std::uint64_t first = 0;
         for (const hole_part& p : body) {
             for (std::size_t i = 0; i < p.num_triangles; ++i) {
-                const glm::uvec3 t = p.triangles[static_cast<std::uint32_t>(i)];
+                glm::uvec3 t = p.triangles[static_cast<std::uint32_t>(i)];
+                t -= glm::uvec3(p.least);
                 if (t.x >= p.num_vertices || t.y >= p.num_vertices || t.z >= p.num_vertices) continue;
                 if (!is_drawable(p.positions[t.x]) || !is_drawable(p.positions[t.y]) || !is_drawable(p.positions[t.z]))
                     continue;
@@ -213,8 +251,8 @@ template <class Position>
     return all.boundary();
 }
 
-// The cones of one body. Throws std::bad_alloc, or std::length_error for more than 2^32 boundary vertices.
-[[nodiscard]] inline hole_cones close_holes(const std::vector<hole_part>& body, std::uint64_t max_hole_edges) {
+// The boundary of one body. Throws as close_boundary().
+[[nodiscard]] inline hole_boundary find_boundary(const std::vector<hole_part>& body) {
     std::vector<std::uint64_t> ends; // of each part's vertices
     ends.reserve(body.size());
     std::uint64_t num_vertices = 0;
@@ -223,7 +261,12 @@ template <class Position>
         const auto part = static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), v) - ends.begin());
         return body[part].positions[v - (ends[part] - body[part].num_vertices)];
     };
-    return close_boundary(open_edges(body), position, max_hole_edges);
+    return weld_edges(open_edges(body), position);
+}
+
+// The cones of one body. Throws as close_boundary().
+[[nodiscard]] inline hole_cones close_holes(const std::vector<hole_part>& body, std::uint64_t max_hole_edges) {
+    return close_boundary(find_boundary(body), max_hole_edges);
 }
 
 // The same cones as a part of the whole grid sees them, whose first voxel is `offset` units (snap_transform) from its

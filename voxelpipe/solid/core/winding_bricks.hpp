@@ -2,11 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// repair::winding, a brick of 8^3 samples at a time. Where no triangle of the mesh meets the box of a brick's samples,
-// their generalized winding number w is smooth; where no cone does, their sum S of solid angles is. Then one sample in
-// the middle and bounds on derivatives decide most bricks. The bounds only save work, as in winding_tree.hpp.
+// repair::winding, a brick of 8^3 samples at a time. Where the cones of all holes cover less than half of what is seen
+// from anywhere in a brick, or a box of them, the winding numbers of rows decide. Where no triangle of the mesh meets
+// the box of a brick's samples, their generalized winding number w is smooth; where no cone does, their sum S of solid
+// angles is. Then one sample in the middle and bounds on derivatives decide most bricks. In bricks beside small holes,
+// each sample sums up the near ones. The bounds only save work, as in winding_tree.hpp.
 
-#include <voxelpipe/solid/core/winding_tree.hpp>
+#include <voxelpipe/solid/core/winding_angles.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -14,6 +16,8 @@
 namespace voxelpipe::core {
 
 inline constexpr int winding_brick = 8, log2_winding_brick = 3;
+// Boxes of bricks that are decided as a whole, where they can be: samples along each axis.
+inline constexpr int small_winding_box = 16, large_winding_box = 32;
 
 // What there is in the box of a brick's samples, or may be.
 enum winding_mark : std::uint8_t { meets_mesh = 1, meets_cones = 2, has_samples_on_cones = 4 };
@@ -177,11 +181,22 @@ VOXELPIPE_HD void visit_samples_on(const snapped_position& a, const snapped_posi
     }
 }
 
-// Samples of a brick, of which some may not be drawn: from `first` on, `count` along each axis, `step` apart.
+// Samples of a brick, or a box of them, of which some may not be drawn: from `first` on, `count` along each axis,
+// `step` apart.
 struct winding_samples {
     snapped_position first;
     int count[3];
     std::int64_t step;
+
+    // Those of a grid whose indices are `index` and up to `side` - 1 more along each axis.
+    [[nodiscard]] VOXELPIPE_HD static winding_samples of_box(const int (&index)[3], int side, const int (&extent)[3],
+                                                             int fraction) {
+        winding_samples s{};
+        s.step = std::int64_t{1} << fraction;
+        s.first = {s.step * index[0] + s.step / 2, s.step * index[1] + s.step / 2, s.step * index[2] + s.step / 2};
+        for (int k = 0; k < 3; ++k) s.count[k] = extent[k] - index[k] < side ? extent[k] - index[k] : side;
+        return s;
+    }
 
     // Indices of the sample in the middle.
     [[nodiscard]] VOXELPIPE_HD int middle(int k) const { return count[k] / 2; }
@@ -189,6 +204,28 @@ struct winding_samples {
         return {first.x + x * step, first.y + y * step, first.z + z * step};
     }
 };
+
+// A ball around samples, world units.
+struct winding_ball {
+    world_point at;
+    double reach;
+
+    [[nodiscard]] VOXELPIPE_HD static winding_ball around(const winding_view& t, const winding_samples& s) {
+        winding_ball b{to_world(t, s.first), 0.0};
+        for (int k = 0; k < 3; ++k) {
+            const double half = 0.5 * t.scale.length[k] * static_cast<double>(s.step) * (s.count[k] - 1);
+            b.at.x[k] += half;
+            b.reach += half * half;
+        }
+        b.reach = exact::sqrt(b.reach) * (1.0 + 0x1p-20);
+        return b;
+    }
+};
+// True if the cones cover less than half from anywhere among the samples: their verdicts are those of rows.
+[[nodiscard]] VOXELPIPE_HD inline bool is_below_half(const winding_view& t, const winding_samples& s) {
+    const winding_ball b = winding_ball::around(t, s);
+    return is_below_half(t, b.at, b.reach);
+}
 
 // What is known of all samples of a brick.
 struct winding_verdict {
@@ -206,11 +243,12 @@ struct winding_verdict {
     near_holes near;
 };
 
-// k, k_cones: of the sample in the middle. marks: of the brick.
-[[nodiscard]] VOXELPIPE_HD inline winding_verdict judge_brick(const winding_view& t, const winding_samples& s,
-                                                              std::int64_t k, std::int64_t k_cones, unsigned marks,
-                                                              fill_rule rule) {
-    winding_verdict r;
+// Looks for a verdict of all samples where the lids have a smooth sum. Arguments as judge_brick().
+VOXELPIPE_HD inline void judge_smooth_brick(const winding_view& t, const winding_samples& s, std::int64_t k,
+                                            std::int64_t k_cones, unsigned marks, fill_rule rule, winding_verdict& r) {
+    // In the shadow of a hole that is left open k may change anywhere.
+    const bool has_mesh = (marks & meets_mesh) != 0 || t.has_all == 0, has_cones = (marks & meets_cones) != 0;
+    if (has_mesh && has_cones) return;
     const int m[3] = {s.middle(0), s.middle(1), s.middle(2)};
     double side[3], reach = 0.0;
     for (int i = 0; i < 3; ++i) {
@@ -219,43 +257,34 @@ struct winding_verdict {
     }
     reach = exact::sqrt(reach) * (1.0 + 0x1p-20);
     const snapped_position p = s.at(m[0], m[1], m[2]);
-    const world_point at = to_world(t, p);
-    r.near = find_near_holes(t, at, reach);
-    if (is_below_half(t, r.near, at, reach)) {
-        r.kind = winding_verdict::beyond; // by nothing
-        return r;
-    }
-    // In the shadow of a hole that is left open k may change anywhere.
-    const bool has_mesh = (marks & meets_mesh) != 0 || t.has_all == 0, has_cones = (marks & meets_cones) != 0;
-    if (has_mesh && has_cones) return r;
     const lid_angles lids = find_lid_angles(t, p, reach, 0x1p-8);
-    if (!lids.is_known || lids.slope < 0.0) return r;
-    const double w = static_cast<double>(k - k_cones + lids_below(t, p)) - lids.turns;
+    if (!lids.is_known || lids.slope < 0.0) return;
+    const double w = static_cast<double>(k - k_cones + lids_below(t, p, k_cones)) - lids.turns;
     const double off = lids.error + lids.slope * reach;
     const double sum = static_cast<double>(k) - w;
     const double whole = static_cast<double>(exact::round_to_int64(sum));
     if (!has_mesh) {
         const int verdict = verdict_of(rule, w, off);
         r.kind = verdict == 1 ? winding_verdict::inside : winding_verdict::outside;
-        if (verdict >= 0) return r;
+        if (verdict >= 0) return;
     } else if (magnitude_of(sum - whole) + off < 0.5) {
         r.kind = winding_verdict::beyond;
         r.whole = static_cast<std::int64_t>(whole);
-        return r;
+        return;
     }
     r.kind = winding_verdict::unknown;
     // Linear to within half the second derivative times a square, of the sample and of the ends that give the slope.
     const double bend = lids.curve * reach * reach;
-    if (!(bend < 0.25)) return r;
+    if (!(bend < 0.25)) return;
     const lid_angles here = find_lid_angles(t, p, 0.0, 0x1p-14);
-    if (!here.is_known) return r;
+    if (!here.is_known) return;
     r.base = w + lids.turns - here.turns;
     double error = here.error;
     for (int i = 0; i < 3; ++i) {
         if (m[i] == 0) continue;
         const lid_angles there =
             find_lid_angles(t, s.at(i == 0 ? 0 : m[0], i == 1 ? 0 : m[1], i == 2 ? 0 : m[2]), 0.0, 0x1p-14);
-        if (!there.is_known || !(there.error < 0x1p-6) || !(lids.slope * side[i] < 0.4)) return r;
+        if (!there.is_known || !(there.error < 0x1p-6) || !(lids.slope * side[i] < 0.4)) return;
         double change = here.turns - there.turns; // of w, but for whole steps at the lids
         change -= static_cast<double>(exact::round_to_int64(change));
         r.slope[i] = -change / m[i];
@@ -268,36 +297,65 @@ struct winding_verdict {
         r.base = static_cast<double>(k) - r.base;
         for (double& slope : r.slope) slope = -slope;
     }
+}
+
+// k, k_cones: of the sample in the middle. marks: of the brick. list: gets the numbers of near holes; has room for
+// near_holes::most.
+[[nodiscard]] VOXELPIPE_HD inline winding_verdict judge_brick(const winding_view& t, const winding_samples& s,
+                                                              std::int64_t k, std::int64_t k_cones, unsigned marks,
+                                                              fill_rule rule, std::uint32_t* list) {
+    winding_verdict r;
+    const winding_ball ball = winding_ball::around(t, s);
+    r.near = find_near_holes(t, ball.at, ball.reach, list);
+    if (is_below_half(t, r.near, list, ball.at, ball.reach)) {
+        r.kind = winding_verdict::beyond; // by nothing
+        return r;
+    }
+    if (r.near.count <= near_holes::most && r.near.has_large == 0 && r.near.is_coarse == 0)
+        return r; // nothing is smooth beside holes that are smaller than the brick: their edges are in it
+    judge_smooth_brick(t, s, k, k_cones, marks, rule, r);
+    // Samples that are left may be anywhere beside 1/2.
+    if (r.kind == winding_verdict::unknown && r.near.has_large != 0)
+        r.near = find_near_holes(t, ball.at, ball.reach, list, 0x1p-13);
     return r;
 }
 
-// The verdict of a sample of the brick, at these indices from the brick's first.
-[[nodiscard]] VOXELPIPE_HD inline bool judge_sample(const winding_view& t, const winding_samples& s,
-                                                    const winding_verdict& brick, int x, int y, int z,
-                                                    const winding_sample& of, fill_rule rule) {
-    if (of.is_on_cone) return is_inside(rule, of.k);
+// The verdict of a sample of the brick, at these indices from the brick's first: 1 inside, 0 outside, -1 if what is
+// known of the brick does not tell. list: what judge_brick() has listed.
+[[nodiscard]] VOXELPIPE_HD inline int try_sample(const winding_view& t, const winding_samples& s,
+                                                 const winding_verdict& brick, const std::uint32_t* list, int x, int y,
+                                                 int z, const winding_sample& of, fill_rule rule) {
+    if (of.is_on_cone) return is_inside(rule, of.k) ? 1 : 0;
     switch (brick.kind) {
     case winding_verdict::outside:
-        return false;
+        return 0;
     case winding_verdict::inside:
-        return true;
+        return 1;
     case winding_verdict::beyond:
-        return rule == fill_rule::nonzero ? of.k != brick.whole : of.k > brick.whole;
+        return (rule == fill_rule::nonzero ? of.k != brick.whole : of.k > brick.whole) ? 1 : 0;
     case winding_verdict::number:
     case winding_verdict::sum: {
         const double linear = brick.base + (x - s.middle(0)) * brick.slope[0] + (y - s.middle(1)) * brick.slope[1] +
                               (z - s.middle(2)) * brick.slope[2];
         const double w = brick.kind == winding_verdict::number ? linear : static_cast<double>(of.k) - linear;
         const int verdict = verdict_of(rule, w, brick.off);
-        if (verdict >= 0) return verdict != 0;
+        if (verdict >= 0) return verdict;
         break;
     }
     case winding_verdict::unknown:
         break;
     }
     const snapped_position p = s.at(x, y, z);
-    if (is_below_half(t, brick.near, to_world(t, p), 0.0)) return is_inside(rule, of.k);
-    return is_inside_by_winding(t, p, of, rule, brick.near.count > near_holes::most);
+    if (is_below_half(t, brick.near, list, to_world(t, p), 0.0)) return is_inside(rule, of.k) ? 1 : 0;
+    return verdict_by_near_holes(t, brick.near, list, p, of, rule);
+}
+// The verdict of any sample.
+[[nodiscard]] VOXELPIPE_HD inline bool judge_sample(const winding_view& t, const winding_samples& s,
+                                                    const winding_verdict& brick, const std::uint32_t* list, int x,
+                                                    int y, int z, const winding_sample& of, fill_rule rule) {
+    const int verdict = try_sample(t, s, brick, list, x, y, z, of, rule);
+    if (verdict >= 0) return verdict != 0;
+    return is_inside_by_winding(t, s.at(x, y, z), of, rule, brick.near.count > near_holes::most);
 }
 
 } // namespace voxelpipe::core

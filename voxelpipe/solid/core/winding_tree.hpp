@@ -5,11 +5,10 @@
 // repair::winding: whether the generalized winding number w of a sample is at least 1/2 (docs/design.md, "Solids"). By
 // definition it is k, the winding number of the mesh with the cones of close_holes, less the sum S of the cones' solid
 // angles over 4 pi, a sum of integers. Few samples need that sum. Any other lids over the same holes give the same w:
-// here those of a tree, in which a chain of edges of a hole has one triangle and two halves, so that a chain that is
-// far counts as a whole. The bounds only save work: a verdict that they allow is that of the sum.
+// here the cones of holes with few edges, and for others those of a tree, in which a chain of edges of a hole has one
+// triangle and two halves, so that a chain that is far counts as a whole. The bounds only save work: a verdict that
+// they allow is that of the sum.
 
-#include <voxelpipe/solid/core/crossing.hpp>
-#include <voxelpipe/solid/core/row_crossing.hpp>
 #include <voxelpipe/solid/core/solid_angle.hpp>
 
 #include <cstddef>
@@ -30,14 +29,29 @@ struct winding_node {
     std::uint16_t is_closed; // whole holes
 };
 
+// Whole holes, or a closed walk along edges of one, with the part of its cone over them; in a ball, world units.
+struct winding_hole {
+    double centre[3];
+    double radius;           // of a ball around the cones' triangles
+    double area;             // of these, rounded up
+    double vector_area[3];   // of these: half the crosses of edges
+    std::uint32_t behind;    // number of the node behind those within this one; a leaf's is the next
+    std::uint32_t first;     // number of the first of these triangles
+    std::uint32_t triangles; // how many they are
+};
+// Closed walks of no more edges have no lids but their cones.
+inline constexpr std::uint32_t most_small_edges = 16;
+
 // The holes of a body, in a backend's memory. Not owned.
 struct winding_view {
-    const winding_node* nodes = nullptr; // the first one has all edges; within a node, its two halves
+    // Edges of holes with many of them: the first node has all; within a node are its two halves.
+    const winding_node* nodes = nullptr;
     std::uint32_t num_nodes = 0;
     const snapped_position* lids = nullptr; // three a node
-    const winding_node* holes = nullptr;    // whole holes, with the balls and the areas of their cones
-    std::uint32_t num_holes = 0;
-    const snapped_position* corners = nullptr; // of the cones' triangles, three each
+    // Two trees, one behind the other: holes of few edges, then those with nodes.
+    const winding_hole* holes = nullptr;
+    std::uint32_t num_small = 0, num_holes = 0; // nodes of the first tree, and of both
+    const snapped_position* corners = nullptr;  // of the cones' triangles, three each
     std::uint32_t num_triangles = 0;
     std::uint32_t has_all = 1; // no hole is left open, which would cast shadows along rows
     distance_scale scale{};
@@ -62,106 +76,45 @@ inline constexpr double four_pi = 4.0 * pi_as_double;
 struct node_offset {
     double d[3], length;
 };
-[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE node_offset offset_of(const winding_node& n, const world_point& p) {
+template <class Node>
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE node_offset offset_of(const Node& n, const world_point& p) {
     node_offset o{};
     for (int k = 0; k < 3; ++k) o.d[k] = n.centre[k] - p.x[k];
     o.length = exact::sqrt(o.d[0] * o.d[0] + o.d[1] * o.d[1] + o.d[2] * o.d[2]);
     return o;
 }
 
-// The verdict of a winding number between w - off and w + off: 1 inside, 0 outside, -1 if it may be either.
-[[nodiscard]] VOXELPIPE_HD constexpr int verdict_of(fill_rule rule, double w, double off) {
-    if (w - off > 0.5) return 1;
-    if (rule == fill_rule::nonzero) {
-        if (w + off < -0.5) return 1;
-        return w + off < 0.5 && w - off > -0.5 ? 0 : -1;
-    }
-    return w + off < 0.5 ? 0 : -1;
+// The solid angle of small lids that are far, by their vector area; o: from the point to their ball.
+template <class Node>
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE double far_angle(const Node& n, const node_offset& o) {
+    return (n.vector_area[0] * o.d[0] + n.vector_area[1] * o.d[1] + n.vector_area[2] * o.d[2]) /
+           (o.length * o.length * o.length);
 }
 
-// ---- sums -----------------------------------------------------------------------------------------------------------
-
-// The sum over the triangles from `first` to `last`, in units of 2^-bits. Sets `is_on` if the sample lies on one.
-[[nodiscard]] VOXELPIPE_HD inline std::int64_t sum_angles(const winding_view& t, const snapped_position& p, int bits,
-                                                          std::uint32_t first, std::uint32_t last, bool& is_on) {
-    std::int64_t sum = 0;
-    // The narrow form is for samples of a grid; every one of these has a narrow triangle with all of its corners there.
-    const bool is_sample = is_narrow_in_grid(p, p, p) && p.x >= 0 && p.y >= 0 && p.z >= 0 && p.x <= 0x1008000 &&
-                           p.y <= 0x1008000 && p.z <= 0x1008000;
-    for (std::uint32_t i = first; i < last; ++i) {
-        const snapped_position* const c = t.corners + 3 * std::size_t{i};
-        const seen_angle seen =
-            find_angle(see_corners(c[0], c[1], c[2], p, is_sample && is_narrow_in_grid(c[0], c[1], c[2])), t.scale);
-        is_on = is_on || seen.is_on;
-        sum += angle_units(seen.half, bits);
-    }
-    return sum;
-}
-
-// True if k - sum / 2^bits is inside: at least 1/2, or with fill_rule::nonzero its magnitude.
-[[nodiscard]] VOXELPIPE_HD inline bool is_inside_by_sum(fill_rule rule, std::int64_t k, std::int64_t sum, int bits) {
-    const std::int64_t whole = k - (sum >> bits), part = sum & ((std::int64_t{1} << bits) - 1); // whole - part / 2^bits
-    const std::int64_t half = std::int64_t{1} << (bits - 1);
-    if (whole >= 2) return true;
-    if (whole == 1) return part <= half;
-    if (rule != fill_rule::nonzero) return false;
-    return whole == 0 ? part >= half : true; // at most -1/2
-}
+// ---- bounds ---------------------------------------------------------------------------------------------------------
 
 // Bounds of the sum of the magnitudes of the cones' angles, and so of that of S: where it stays below half of 4 pi, the
 // verdict is that of k. A triangle at a distance d covers at most its area / d^2.
 [[nodiscard]] VOXELPIPE_HD constexpr double half_turn(const winding_view& t) {
     return (0.5 - winding_margin(t.num_triangles)) * four_pi;
 }
-[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE double most_angle(const winding_node& hole, const world_point& p,
+[[nodiscard]] VOXELPIPE_HD VOXELPIPE_INLINE double most_angle(const winding_hole& hole, const world_point& p,
                                                               double reach) {
     const double gap = offset_of(hole, p).length - hole.radius - reach;
     return gap > 0.0 ? hole.area / (gap * gap) : 2.0 * four_pi;
 }
-
-// The holes near a ball, and what all others cover at most from any of its points.
-struct near_holes {
-    static constexpr std::uint32_t most = 256;
-    double far_angle = 0.0;
-    std::uint32_t count = 0; // more than `most`: not all are listed
-    std::uint32_t hole[most];
-};
-[[nodiscard]] VOXELPIPE_HD inline near_holes find_near_holes(const winding_view& t, const world_point& p,
-                                                             double reach) {
-    near_holes r;
-    for (std::uint32_t i = 0; i < t.num_holes;) {
-        const winding_node& n = t.holes[i];
-        const double angle = most_angle(n, p, reach);
-        const bool is_leaf = n.behind == i + 1;
-        if (angle <= (is_leaf ? 0x1p-9 : 0x1p-13) * four_pi) { // there are many that are far
-            r.far_angle += angle;
-            i = n.behind;
-            continue;
-        }
-        if (is_leaf) {
-            if (r.count < near_holes::most) r.hole[r.count] = i;
-            ++r.count;
-        }
-        ++i;
-    }
-    return r;
-}
-// True if the cones of all holes cover less than half from all points of a ball within that of `near`.
-[[nodiscard]] VOXELPIPE_HD inline bool is_below_half(const winding_view& t, const near_holes& near,
-                                                     const world_point& p, double reach) {
-    if (near.count > near_holes::most) return false;
-    double sum = near.far_angle;
-    for (std::uint32_t i = 0; i < near.count; ++i) sum += most_angle(t.holes[near.hole[i]], p, reach);
-    return sum < half_turn(t);
-}
-[[nodiscard]] VOXELPIPE_HD inline bool is_below_half(const winding_view& t, const world_point& p) {
+// True if the cones of all holes cover less than half from all points of a ball; false if they may cover more.
+[[nodiscard]] VOXELPIPE_HD inline bool is_below_half(const winding_view& t, const world_point& p, double reach = 0.0) {
     const double limit = half_turn(t);
     double sum = 0.0;
     for (std::uint32_t i = 0; i < t.num_holes;) {
-        const winding_node& n = t.holes[i];
-        const bool is_leaf = n.behind == i + 1;
-        const double most = most_angle(n, p, 0.0);
-        if (!is_leaf && most > 0.02 * limit) {
+        const winding_hole& n = t.holes[i];
+        const double gap = offset_of(n, p).length - n.radius - reach;
+        const double most = gap > 0.0 ? n.area / (gap * gap) : 2.0 * four_pi;
+        // Its bound does not matter, or is not much more than those of its parts.
+        const bool is_one =
+            n.behind == i + 1 || most <= 0x1p-9 * four_pi || (gap >= 1.5 * n.radius && most <= 0x1p-4 * four_pi);
+        if (!is_one) {
             ++i;
             continue;
         }
@@ -172,167 +125,62 @@ struct near_holes {
     return true;
 }
 
-// ---- the tree's lids ------------------------------------------------------------------------------------------------
-
-// What the lids add to the winding number of a point, moved by (e, e^2, e^3): their crossings below it.
-[[nodiscard]] VOXELPIPE_HD inline std::int64_t lids_below(const winding_view& t, const snapped_position& p) {
-    const world_point at = to_world(t, p);
-    const double slack = 0x1p-48 * (magnitude_of(at.x[0]) + magnitude_of(at.x[1]) + magnitude_of(at.x[2]));
-    std::int64_t sum = 0;
-    for (std::uint32_t i = 0; i < t.num_nodes;) {
-        const winding_node& n = t.nodes[i];
-        const double y = n.centre[1] - at.x[1], z = n.centre[2] - at.x[2], radius = n.radius + slack;
-        if (y * y + z * z > radius * radius * (1.0 + 0x1p-40) || n.centre[0] - radius > at.x[0]) {
-            i = n.behind;
-            continue;
-        }
-        if (n.has_lid != 0) {
-            const snapped_position* const c = t.lids + 3 * std::size_t{i};
-            const bool meets = min3(c[0].y, c[1].y, c[2].y) <= p.y && max3(c[0].y, c[1].y, c[2].y) >= p.y &&
-                               min3(c[0].z, c[1].z, c[2].z) <= p.z && max3(c[0].z, c[1].z, c[2].z) >= p.z &&
-                               min3(c[0].x, c[1].x, c[2].x) <= p.x;
-            if (meets) sum += crossing_below(c[0], c[1], c[2], p);
-        }
-        ++i;
-    }
-    return sum;
-}
-
-// The solid angle of a triangle as seen from a point that is moved by (e, e^2, e^3), to within 2^-36; false on its
-// edges, from where it may be any.
-[[nodiscard]] VOXELPIPE_HD inline bool find_lid_angle(const winding_view& t, const snapped_position* c,
-                                                      const snapped_position& p, double& angle) {
-    double v[3][3], length[3], dot[3];
-    for (int i = 0; i < 3; ++i) {
-        v[i][0] = t.scale.length[0] * static_cast<double>(c[i].x - p.x);
-        v[i][1] = t.scale.length[1] * static_cast<double>(c[i].y - p.y);
-        v[i][2] = t.scale.length[2] * static_cast<double>(c[i].z - p.z);
-        length[i] = exact::sqrt(v[i][0] * v[i][0] + v[i][1] * v[i][1] + v[i][2] * v[i][2]);
-    }
-    for (int i = 0; i < 3; ++i) {
-        const int j = i == 2 ? 0 : i + 1;
-        dot[i] = v[i][0] * v[j][0] + v[i][1] * v[j][1] + v[i][2] * v[j][2];
-    }
-    const double volume = v[0][0] * (v[1][1] * v[2][2] - v[1][2] * v[2][1]) +
-                          v[0][1] * (v[1][2] * v[2][0] - v[1][0] * v[2][2]) +
-                          v[0][2] * (v[1][0] * v[2][1] - v[1][1] * v[2][0]);
-    const double all = length[0] * length[1] * length[2];
-    const double other = all + dot[0] * length[2] + dot[1] * length[0] + dot[2] * length[1];
-    // Both have an error of a few units of 2^-53 of `all`.
-    if (greater(magnitude_of(volume), other) > 0x1p-8 * all) {
-        angle = 2.0 * written_atan2(volume, other);
-        return true;
-    }
-    const seen_triangle seen = see_wide(c[0], c[1], c[2], p);
-    const seen_angle exactly = find_angle(seen, t.scale);
-    angle = 2.0 * exactly.half;
-    if (!exactly.is_on) return true;
-    // On the triangle, in whose plane crosses are multiples of the normal. The moved point is in front of it, where its
-    // angle is below 0, if the normal's first component is above 0.
-    for (int k = 0; k < 3; ++k) {
-        const double n = seen.normal[k];
-        if (!(n < 0.0 || n > 0.0)) continue;
-        angle = n > 0.0 ? -2.0 * pi_as_double : 2.0 * pi_as_double;
-        bool is_within = true;
-        for (int i = 0; i < 3; ++i)
-            is_within = is_within && (n > 0.0 ? seen.cross[i][k] > 0.0 : seen.cross[i][k] < 0.0);
-        return is_within;
-    }
-    return false;
-}
-
-// The lids' solid angles over 4 pi as seen from a point: turns, to within `error`. But for whole steps at the lids they
-// are smooth beside the holes' edges: in the ball of radius `reach` around the point, the gradient is at most `slope`
-// and second derivatives at most `curve`; negative if the ball meets an edge.
-struct lid_angles {
-    double turns, error, slope, curve;
-    bool is_known;
-};
-// most: what each node may add to the error, and to slope times reach, that is not opened.
+// The holes near a ball, and the sum of the angles of all others' cones: from any point of the ball it is `angle`, to
+// within `error`.
 //
-// The solid angle of lids in a ball of radius R at a distance d is vector area . (c - p) / d^3 to within area * 2 R /
-// (d - R)^3, because the gradient of (y - p) / |y - p|^3 has norm 2 / |y - p|^3, and second derivatives 6 / |y - p|^4.
-// The gradient of all angles is also the line integral of r x dl / |r|^3 along the edges. Of whole holes the lesser
-// bound counts; chains have another boundary beside, which the others' cancels.
-[[nodiscard]] VOXELPIPE_HD inline lid_angles find_lid_angles(const winding_view& t, const snapped_position& p,
-                                                             double reach, double most) {
-    const world_point at = to_world(t, p);
-    const double limit = most * four_pi;
-    double sum = 0.0, error = winding_margin(t.num_triangles) * four_pi, slope = 0.0, curve = 0.0;
-    lid_angles r{0.0, 0.0, 0.0, 0.0, true};
-    bool is_smooth = true;
-    for (std::uint32_t i = 0; i < t.num_nodes;) {
-        const winding_node& n = t.nodes[i];
-        const node_offset o = offset_of(n, at);
-        const double gap = o.length - n.radius, near = gap - reach;
+// A triangle set in a ball of radius R whose vector area is N has, from a point at a distance d, the angle N . r / d^3
+// to within area * 2 R / (d - R)^3 (find_lid_angles); from all points that are at most `reach` away from that one, to
+// within area * 2 (R + reach) / (d - R - reach)^3. It also is at most area / (d - R - reach)^2.
+struct near_holes {
+    static constexpr std::uint32_t most = 256; // in a list
+    struct sum {
+        double angle, error;
+    };
+    sum far[2] = {{0.0, 0.0}, {0.0, 0.0}}; // of small holes, and of large ones, which have nodes
+    std::uint32_t count = 0;               // more than `most`: not all are listed
+    std::uint16_t has_large = 0;           // among those that are near
+    std::uint16_t is_coarse = 0;           // one of them is as large as the ball
+};
+// list: their numbers; has room for near_holes::most. most_error: what each group of holes may add to the error. Many
+// are far.
+[[nodiscard]] VOXELPIPE_HD inline near_holes find_near_holes(const winding_view& t, const world_point& p, double reach,
+                                                             std::uint32_t* list, double most_error = 0x1p-10) {
+    near_holes r;
+    r.far[0].error = winding_margin(t.num_triangles) * four_pi;
+    for (std::uint32_t i = 0; i < t.num_holes;) {
+        const winding_hole& n = t.holes[i];
+        const node_offset o = offset_of(n, p);
+        const double gap = o.length - n.radius - reach;
         const bool is_leaf = n.behind == i + 1;
-        const bool is_far = gap > 0.0 && 2.0 * n.area * n.radius <= limit * gap * gap * gap;
-        double slope_of = 0.0, curve_of = 0.0;
-        if (reach > 0.0) {
-            const double inverse = 1.0 / near, square = inverse * inverse;
-            const double least = n.is_closed != 0 ? 0.0 : n.length;
-            slope_of = lesser(n.length, greater(least, 2.0 * n.area * inverse)) * square;
-            curve_of = lesser(2.0 * n.length, greater(2.0 * least, 6.0 * n.area * inverse)) * square * inverse;
-        }
-        const bool is_flat = near > 0.0 && reach * slope_of <= limit;
-        if (is_leaf || (is_far && is_flat)) {
-            is_smooth = is_smooth && near > 0.0;
-            slope += slope_of;
-            curve += curve_of;
-            if (is_far) {
-                const double cube = 1.0 / (o.length * o.length * o.length), further = o.length / gap;
-                sum += (n.vector_area[0] * o.d[0] + n.vector_area[1] * o.d[1] + n.vector_area[2] * o.d[2]) * cube;
-                error += 2.0 * n.area * n.radius * cube * (further * further * further);
+        if (gap > 0.0) {
+            const double inverse = 1.0 / gap, bound = n.area * inverse * inverse;
+            const double off = 2.0 * bound * (n.radius + reach) * inverse;
+            if (lesser(bound, off) <= (is_leaf ? 0x1p-8 : most_error) * four_pi) {
+                near_holes::sum& far = r.far[i < t.num_small ? 0 : 1];
+                far.error += lesser(bound, off);
+                if (off < bound) far.angle += far_angle(n, o);
                 i = n.behind;
                 continue;
             }
         }
-        if (n.has_lid != 0) {
-            double angle = 0.0;
-            if (!find_lid_angle(t, t.lids + 3 * std::size_t{i}, p, angle)) {
-                r.is_known = false;
-                return r;
-            }
-            sum += angle;
-            error += 0x1p-36;
+        if (is_leaf) {
+            if (r.count < near_holes::most) list[r.count] = i;
+            ++r.count;
+            if (n.triangles > most_small_edges) r.has_large = 1;
+            if (n.radius > reach) r.is_coarse = 1;
         }
         ++i;
     }
-    r.turns = sum / four_pi;
-    r.error = error / four_pi;
-    r.slope = is_smooth ? slope / four_pi * (1.0 + 0x1p-20) : -1.0;
-    r.curve = is_smooth ? curve / four_pi * (1.0 + 0x1p-20) : -1.0;
     return r;
 }
-
-// ---- verdicts -------------------------------------------------------------------------------------------------------
-
-// What is known of a sample beside its place.
-struct winding_sample {
-    std::int64_t k;       // its winding number, with the cones
-    std::int64_t k_cones; // what the cones add to it
-    bool is_on_cone;      // on a closed triangle of one that has an area
-};
-
-// tries_bound: whether the cones are likely to be small beside the distance to them.
-[[nodiscard]] VOXELPIPE_HD inline bool is_inside_by_winding(const winding_view& t, const snapped_position& p,
-                                                            const winding_sample& s, fill_rule rule,
-                                                            bool tries_bound = true) {
-    if (t.num_triangles == 0 || s.is_on_cone) return is_inside(rule, s.k);
-    if (tries_bound && is_below_half(t, to_world(t, p))) return is_inside(rule, s.k);
-    const std::int64_t k = s.k - s.k_cones + lids_below(t, p); // of the mesh with the tree's lids
-    constexpr int steps = 6;                                   // to 2^-24
-    double most = 0x1p-4;
-    for (int i = 0; i < steps; ++i, most *= 0x1p-4) {
-        const lid_angles lids = find_lid_angles(t, p, 0.0, most);
-        if (!lids.is_known) break;
-        const int verdict = verdict_of(rule, static_cast<double>(k) - lids.turns, lids.error);
-        if (verdict >= 0) return verdict != 0;
-    }
-    bool is_on = false;
-    const int bits = angle_bits(t.num_triangles);
-    const std::int64_t sum = sum_angles(t, p, bits, 0, t.num_triangles, is_on);
-    return is_on ? is_inside(rule, s.k) : is_inside_by_sum(rule, s.k, sum, bits);
+// True if the cones of all holes cover less than half from all points of a ball within that of `near`.
+[[nodiscard]] VOXELPIPE_HD inline bool is_below_half(const winding_view& t, const near_holes& near,
+                                                     const std::uint32_t* list, const world_point& p, double reach) {
+    if (near.count > near_holes::most) return false;
+    const double limit = half_turn(t);
+    double sum = magnitude_of(near.far[0].angle + near.far[1].angle) + near.far[0].error + near.far[1].error;
+    for (std::uint32_t i = 0; i < near.count && sum < limit; ++i) sum += most_angle(t.holes[list[i]], p, reach);
+    return sum < limit;
 }
 
 } // namespace voxelpipe::core

@@ -2,14 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// repair::close_holes and repair::winding: the snapped mesh goes to the host once, which finds the holes and their
-// cones (solid/core/holes.hpp), and the cones come back as further triangles of each body; for repair::winding with a
-// tree over the holes.
+// repair::close_holes and repair::winding: the boundary of each body's snapped mesh is found on the device
+// (solid/passes/find_boundary.hpp) and goes to the host, which makes the cones (solid/core/holes.hpp); these come back
+// as further triangles of the body, for repair::winding with a tree over the holes.
 
 #include <voxelpipe/device/base/device_buffer.cuh>
+#include <voxelpipe/device/call/backend_passes.cuh>
 #include <voxelpipe/device/scene/scene_memory.cuh>
 #include <voxelpipe/solid/core/holes.hpp>
 #include <voxelpipe/solid/core/winding_lids.hpp>
+#include <voxelpipe/solid/passes/find_boundary.hpp>
 #include <voxelpipe/solid/solid.hpp>
 
 #include <cstdint>
@@ -17,6 +19,7 @@
 #include <new>
 #include <span>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 namespace voxelpipe::device {
@@ -38,57 +41,52 @@ struct solid_cones {
     std::vector<device_buffer<core::snapped_position>> positions;
     std::vector<device_buffer<int32_position>> near;
     std::vector<device_buffer<glm::uvec3>> triangles;
-    std::vector<device_buffer<core::winding_node>> nodes, holes;
+    std::vector<device_buffer<core::winding_node>> nodes;
+    std::vector<device_buffer<core::winding_hole>> holes;
     std::vector<device_buffer<core::snapped_position>> lids, corners;
     std::vector<device_buffer<core::winding_view>> trees; // repair::winding: one array, of the parts' trees
 };
 
-template <class T>
-[[nodiscard]] std::vector<T> copy_to_host(const T* from, std::size_t count, cudaStream_t stream) {
-    std::vector<T> host(count);
-    if (count != 0) check(cudaMemcpyAsync(host.data(), from, count * sizeof(T), cudaMemcpyDefault, stream));
-    return host;
+// The boundary of draws that are one body. Waits. Throws as find_cones().
+template <class Mesh, class VertexShader, class SolidShader>
+[[nodiscard]] core::hole_boundary find_boundary_of(const stream_memory& from,
+                                                   std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
+                                                   std::size_t first_draw, const core::snap_transform& snap) {
+    std::uint64_t num_vertices = 0;
+    for (const auto& d : draws) num_vertices += d.mesh.num_vertices();
+    device_buffer<core::snapped_position> exact(from, num_vertices);
+    std::vector<core::passes::body_triangles> parts;
+    {
+        device_buffer<int32_position> near(from, num_vertices);
+        std::uint64_t first = 0;
+        for (std::size_t d = 0; d < draws.size(); ++d) {
+            const Mesh& mesh = draws[d].mesh;
+            vertex_shade(mesh, draws[d].vertex_shader, snap, static_cast<std::uint32_t>(first_draw + d),
+                         {exact.data() + first, near.data() + first}, static_cast<no_varyings*>(nullptr), from.stream);
+            parts.push_back({core::triangles_of(mesh), static_cast<std::uint32_t>(mesh.num_triangles()),
+                             static_cast<std::uint32_t>(mesh.num_vertices()), 0, static_cast<std::uint32_t>(first)});
+            first += mesh.num_vertices();
+        }
+    }
+    backend_passes passes(from.stream, from.resource);
+    return core::find_boundary(passes, exact.data(), num_vertices,
+                               std::span<const core::passes::body_triangles>(parts));
 }
 
-// The cones of each body, found on the host. Waits. Throws std::bad_alloc, std::length_error, cuda_failure, or
-// std::runtime_error with CUDA's text.
+// The cones of each body: its boundary is found on the device, and closed on the host. Waits. Throws std::bad_alloc,
+// std::length_error, cuda_failure, or std::runtime_error with CUDA's text.
 template <class Mesh, class VertexShader, class SolidShader>
 [[nodiscard]] std::vector<core::hole_cones> find_cones(const stream_memory& from,
                                                        std::span<const draw<Mesh, VertexShader, SolidShader>> draws,
                                                        const grid& g, const solid_options& options) {
-    struct mesh_on_host {
-        std::vector<core::snapped_position> positions;
-        std::vector<glm::uvec3> triangles;
-    };
     const core::snap_transform snap = core::make_snap_transform(g);
-    std::vector<mesh_on_host> meshes(draws.size());
-    for (std::size_t d = 0; d < draws.size() && options.cones == nullptr; ++d) { // cones that are given need no mesh
-        const Mesh& mesh = draws[d].mesh;
-        const device_buffer<core::snapped_position> exact(from, mesh.num_vertices());
-        const device_buffer<int32_position> near(from, mesh.num_vertices());
-        vertex_shade(mesh, draws[d].vertex_shader, snap, static_cast<std::uint32_t>(d),
-                     {const_cast<core::snapped_position*>(exact.data()), const_cast<int32_position*>(near.data())},
-                     static_cast<no_varyings*>(nullptr), from.stream);
-        meshes[d] = {copy_to_host(exact.data(), exact.size(), from.stream),
-                     copy_to_host(mesh.triangles.data(), mesh.triangles.size(), from.stream)};
-    }
-    check(cudaStreamSynchronize(from.stream), stage::vertex_shade);
-
     std::vector<core::hole_cones> found;
-    const bool is_split = options.bodies == bodies::draw;
-    for (std::size_t first = 0; first < draws.size();) {
-        const std::size_t last = is_split ? first + 1 : draws.size();
-        std::vector<core::hole_part> body;
-        for (std::size_t d = first; d < last; ++d)
-            body.push_back({meshes[d].positions.data(),
-                            meshes[d].positions.size(),
-                            {meshes[d].triangles.data(), static_cast<std::uint32_t>(meshes[d].triangles.size()),
-                             static_cast<std::uint32_t>(draws[d].mesh.positions.size())},
-                            draws[d].mesh.num_triangles()});
-        found.push_back(options.cones != nullptr ? core::moved(options.cones[found.size()], snap.offset)
-                                                 : core::close_holes(body, options.max_hole_edges));
-        first = last;
-    }
+    const std::size_t each = options.bodies == bodies::draw ? 1 : draws.size();
+    for (std::size_t first = 0; first < draws.size(); first += each)
+        found.push_back(options.cones != nullptr // cones that are given need no mesh
+                            ? core::moved(options.cones[found.size()], snap.offset)
+                            : core::close_boundary(find_boundary_of(from, draws.subspan(first, each), first, snap),
+                                                   options.max_hole_edges));
     return found;
 }
 
@@ -120,10 +118,12 @@ template <class Mesh, class VertexShader, class SolidShader>
                          num_vertices};
         if (options.repair == repair::winding) {
             const core::winding_tree tree(
-                cones, core::make_distance_scale(g.voxel_size, core::make_snap_transform(g).fraction));
-            using nodes_view = array_view<const core::winding_node>;
-            auto& nodes = made.nodes.emplace_back(from, nodes_view(tree.nodes().data(), tree.nodes().size()));
-            auto& holes = made.holes.emplace_back(from, nodes_view(tree.holes().data(), tree.holes().size()));
+                cones, core::make_distance_scale(g.voxel_size, core::make_snap_transform(g).fraction),
+                std::thread::hardware_concurrency());
+            auto& nodes = made.nodes.emplace_back(
+                from, array_view<const core::winding_node>(tree.nodes().data(), tree.nodes().size()));
+            auto& holes = made.holes.emplace_back(
+                from, array_view<const core::winding_hole>(tree.holes().data(), tree.holes().size()));
             auto& lids = made.lids.emplace_back(from, positions_view(tree.lids().data(), tree.lids().size()));
             auto& corners =
                 made.corners.emplace_back(from, positions_view(tree.corners().data(), tree.corners().size()));

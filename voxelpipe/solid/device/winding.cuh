@@ -3,18 +3,16 @@
 #pragma once
 
 // repair::winding: the winding number of every voxel, of the mesh with its cones, and what the cones' solid angles make
-// of it, brick by brick (solid/core/winding_bricks.hpp).
+// of it, brick by brick (solid/device/winding_bricks.cuh).
 
-#include <voxelpipe/solid/core/winding_bricks.hpp>
 #include <voxelpipe/solid/device/bit_sweeps.cuh>
 #include <voxelpipe/solid/device/emit_crossings.cuh>
 #include <voxelpipe/solid/device/sweep_rows.cuh>
+#include <voxelpipe/solid/device/winding_bricks.cuh>
 
 #include <cstdint>
 
 namespace voxelpipe::device {
-
-using core::winding_brick;
 
 // Winding numbers of all bodies, a place a voxel and one behind each row; and bits and marks of one body.
 struct winding_memory {
@@ -23,13 +21,13 @@ struct winding_memory {
     word* inside = nullptr;
     word* on_cones = nullptr;       // voxels whose samples lie on a cone
     std::uint32_t* marks = nullptr; // core::winding_mark, of each brick
+    winding_work work;
 
     [[nodiscard]] static std::uint64_t of_body(const row_grid& grid) {
         return grid.num_rows() * (static_cast<std::uint64_t>(grid.extent.x) + 1);
     }
     [[nodiscard]] static std::uint64_t num_bricks(const row_grid& grid) {
-        const auto n = core::bricks_of({{grid.extent.x, grid.extent.y, grid.extent.z}});
-        return static_cast<std::uint64_t>(n[0] * n[1] * n[2]);
+        return winding_boxes{grid.extent, winding_brick}.count();
     }
     [[nodiscard]] static winding_memory take(arena& memory, const row_grid& grid, std::uint32_t bodies) {
         winding_memory m;
@@ -38,6 +36,7 @@ struct winding_memory {
         m.inside = memory.take<word>(bit_box{grid.extent}.num_words());
         m.on_cones = memory.take<word>(bit_box{grid.extent}.num_words());
         m.marks = memory.take<std::uint32_t>(num_bricks(grid));
+        m.work = winding_work::take(memory, grid.extent);
         return m;
     }
     void clear(const row_grid& grid, std::uint32_t bodies, cudaStream_t stream) const {
@@ -110,10 +109,10 @@ __global__ __launch_bounds__(threads_per_block) void sum_windings_kernel(std::in
         std::int32_t before = 0;
         for (std::uint32_t x0 = 0; x0 < nx; x0 += 32) {
             const std::uint32_t x = x0 + lane;
-            const std::int32_t winding = before + sum_up_to_lane(x < nx ? of_row[x] : 0);
+            const std::int32_t step = x < nx ? of_row[x] : 0, winding = before + sum_up_to_lane(step);
             before = __shfl_sync(0xffffffffu, winding, 31);
             if (x < nx) {
-                of_row[x] = winding;
+                if (winding != step) of_row[x] = winding; // rows are mostly 0
                 const auto size = static_cast<std::uint32_t>(winding < 0 ? -winding : winding);
                 most = size > most ? size : most;
             }
@@ -127,69 +126,15 @@ __global__ __launch_bounds__(threads_per_block) void sum_windings_kernel(std::in
         before = 0;
         for (std::uint32_t x0 = 0; x0 < nx; x0 += 32) {
             const std::uint32_t x = x0 + lane;
-            const std::int32_t winding = before + sum_up_to_lane(x < nx ? cones[x] : 0);
+            const std::int32_t step = x < nx ? cones[x] : 0, winding = before + sum_up_to_lane(step);
             before = __shfl_sync(0xffffffffu, winding, 31);
-            if (x < nx) cones[x] = winding;
+            if (x < nx && winding != step) cones[x] = winding;
         }
     }
     const unsigned long long sum = block_sum(open);
     if (threadIdx.x == 0 && sum != 0) atomicAdd(&state->solid.open_rows, sum);
     most = __reduce_max_sync(0xffffffffu, most);
     if (lane == 0 && most != 0) atomicMax(&state->solid.max_winding, static_cast<unsigned long long>(most));
-}
-
-// Decides the samples of bricks by their generalized winding numbers, where these may differ from the others'. A warp
-// takes a brick, whose rows are bytes of the bits.
-// `tree` is no __grid_constant__: nvcc 13.0 makes wrong code of references to it (scripts/check_ptx.py).
-template <class State>
-__global__ __launch_bounds__(threads_per_block) void decide_bricks_kernel(
-    const std::int32_t* windings, const std::int32_t* of_cones, const word* on_cones, const std::uint32_t* marks,
-    const __grid_constant__ row_grid grid, const core::winding_view tree, fill_rule rule, std::uint8_t* inside,
-    const State* state) {
-    if (state->index_error != 0) return;
-    const int lane = static_cast<int>(threadIdx.x % 32);
-    const auto bricks_of = [](int n) { return static_cast<std::uint64_t>(n + winding_brick - 1) / winding_brick; };
-    const std::uint64_t bx = bricks_of(grid.extent.x), by = bricks_of(grid.extent.y), bz = bricks_of(grid.extent.z);
-    const bit_box box{grid.extent};
-    const auto at = [&](int i) { return (2 * std::int64_t{i} + 1) << (grid.fraction - 1); };
-    const auto place = [&](int x, int y, int z) {
-        return grid.row(y, z) * (static_cast<std::uint64_t>(grid.extent.x) + 1) + static_cast<std::uint64_t>(x);
-    };
-    const auto cut = [](int first, int extent) {
-        return extent - first < winding_brick ? extent - first : winding_brick;
-    };
-    for (std::uint64_t brick = std::uint64_t{blockIdx.x} * (threads_per_block / 32) + warp_in_block();
-         brick < bx * by * bz; brick += std::uint64_t{gridDim.x} * (threads_per_block / 32)) {
-        const int x0 = static_cast<int>(brick % bx) * winding_brick,
-                  y0 = static_cast<int>(brick / bx % by) * winding_brick,
-                  z0 = static_cast<int>(brick / (bx * by)) * winding_brick;
-        const core::winding_samples samples{{at(x0), at(y0), at(z0)},
-                                            {cut(x0, grid.extent.x), cut(y0, grid.extent.y), cut(z0, grid.extent.z)},
-                                            std::int64_t{1} << grid.fraction};
-        const std::uint64_t middle = place(x0 + samples.middle(0), y0 + samples.middle(1), z0 + samples.middle(2));
-        const std::uint32_t mark = marks[brick];
-        // For all lanes alike.
-        const core::winding_verdict known =
-            core::judge_brick(tree, samples, windings[middle], of_cones[middle], mark, rule);
-        if (known.kind == core::winding_verdict::beyond && known.whole == 0) continue; // as the bits are
-        for (int step = 0; step < 2 * winding_brick; ++step) {
-            const int x = lane % 8, y = lane / 8 + 4 * (step % 2), z = step / 2;
-            const bool exists = x < samples.count[0] && y < samples.count[1] && z < samples.count[2];
-            bool is_in = false;
-            if (exists) {
-                const std::uint64_t i = place(x0 + x, y0 + y, z0 + z);
-                const bool is_on =
-                    (mark & core::has_samples_on_cones) != 0 &&
-                    (on_cones[box.first_word(y0 + y, z0 + z) + static_cast<std::uint64_t>(x0 / 32)] >> (x0 % 32 + x) &
-                     1) != 0;
-                is_in = core::judge_sample(tree, samples, known, x, y, z, {windings[i], of_cones[i], is_on}, rule);
-            }
-            const word bits = __ballot_sync(0xffffffffu, static_cast<int>(is_in));
-            if (exists && lane % 8 == 0)
-                inside[box.first_word(y0 + y, z0 + z) * sizeof(word) + static_cast<std::uint64_t>(x0 / 8)] =
-                    static_cast<std::uint8_t>(bits >> (lane / 8 * 8));
-        }
-    }
 }
 
 // What an extent makes of the inside and of the cover in `mask`.
@@ -221,10 +166,8 @@ void add_windings(const winding_memory& m, const core::winding_view& tree, const
         mark_bricks_kernel<pipeline_state><<<fill_device(all * 32, 16), threads_per_block, 0, stream>>>(
             geo, grid, triangles, m.on_cones, m.marks, state);
         check(cudaGetLastError(), stage::fine_raster);
-        decide_bricks_kernel<pipeline_state><<<blocks, threads_per_block, 0, stream>>>(
-            m.windings + first, m.of_cones + first, m.on_cones, m.marks, grid, tree, rule,
-            reinterpret_cast<std::uint8_t*>(m.inside), state);
-        check(cudaGetLastError(), stage::fine_raster);
+        decide_windings(tree, {m.windings + first, m.of_cones + first, m.on_cones, m.marks, grid, rule}, m.work,
+                        m.inside, state, stream);
     }
     join_cover_kernel<pipeline_state><<<fill_device(box.num_words(), 16), threads_per_block, 0, stream>>>(
         m.inside, box.num_words(), extent, mask, state);
