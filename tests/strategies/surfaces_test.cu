@@ -174,7 +174,7 @@ TEST(DeviceSurfaces, ValuesHaveTheBytesOfTheCpu) {
         const vp::grid g = grid_around_models(glm::ivec3(18, 21, 19));
         for (const vp::remesh_options& o :
              {vp::remesh_options{},
-              vp::remesh_options{.repair = vp::repair::exterior, .closing = 2, .min_component = 9},
+              vp::remesh_options{.repair = vp::repair::exterior, .closing = 1, .min_component = 9},
               vp::remesh_options{.repair = vp::repair::close_holes}, vp::remesh_options{.level = 0.05}}) {
             const host_values a = remesh_with_values(gpu, m, g, o, {1}), b = remesh_with_values(cpu, m, g, o, {1});
             EXPECT_TRUE(a.mesh.status.ok()) << a.mesh.status.message();

@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// The crossings of a mesh with the edges that its surface crosses, on a GPU: one pass over the triangles lists their
-// crossings with rows along all three axes, in any order, since what is made of a row does not depend on the order of
-// crossings between the same samples. Then each axis is sorted by row, and its edges look for theirs.
+// The crossings of a mesh with the edges that its surface crosses, on a GPU: a pass over the triangles for each axis
+// lists their crossings with rows, in any order, since what is made of a row does not depend on the order of crossings
+// between the same samples. The numbers of all three are waited for at once. Then each axis is sorted by row, and its
+// edges look for theirs.
 
 #include <voxelpipe/device/scene/key_sort.cuh>
 #include <voxelpipe/surfaces/device/word_cells.cuh>
@@ -43,11 +44,14 @@ struct row_crossing_list {
     }
 };
 
-// Appends the crossings of triangle i with rows along an axis. All threads of the block call it.
+// Appends the crossings of triangles with rows along an axis. A kernel for all axes takes more registers than two
+// blocks have room for.
 template <int Axis>
-__device__ VOXELPIPE_INLINE void append_crossings(const core::passes::list_mesh_crossings<Axis>& pass, std::uint64_t i,
-                                                  const row_crossing_list& out, staged_crossings& staged) {
-    __syncthreads();
+__global__ __launch_bounds__(threads_per_block, 2) void append_crossings_kernel(
+    const __grid_constant__ core::passes::list_mesh_crossings<Axis> pass, row_crossing_list out) {
+    await_stream();
+    __shared__ staged_crossings staged;
+    const std::uint64_t i = std::uint64_t{blockIdx.x} * threads_per_block + threadIdx.x;
     if (threadIdx.x == 0) staged.count = 0;
     __syncthreads();
     if (i < pass.mesh.count)
@@ -67,23 +71,11 @@ __device__ VOXELPIPE_INLINE void append_crossings(const core::passes::list_mesh_
     for (std::uint32_t k = threadIdx.x; k < count; k += threads_per_block)
         out.store(staged.begin + k, staged.keys[k], staged.triangles[k]);
 }
-
-// The lists of all axes.
-struct append_all_crossings {
-    core::passes::list_mesh_crossings<0> along_x;
-    core::passes::list_mesh_crossings<1> along_y;
-    core::passes::list_mesh_crossings<2> along_z;
-    row_crossing_list lists[3];
-};
-template <int = 0>
-__global__
-__launch_bounds__(threads_per_block) void append_crossings_kernel(const __grid_constant__ append_all_crossings pass) {
-    await_stream();
-    __shared__ staged_crossings staged;
-    const std::uint64_t i = std::uint64_t{blockIdx.x} * threads_per_block + threadIdx.x;
-    append_crossings(pass.along_x, i, pass.lists[0], staged);
-    append_crossings(pass.along_y, i, pass.lists[1], staged);
-    append_crossings(pass.along_z, i, pass.lists[2], staged);
+template <int Axis>
+void append_crossings(const core::passes::list_mesh_crossings<Axis>& pass, const row_crossing_list& out,
+                      cudaStream_t stream) {
+    launch_behind(append_crossings_kernel<Axis>, num_blocks(pass.mesh.count), threads_per_block, stream,
+                  stage::coarse_raster, pass, out);
 }
 
 } // namespace device
@@ -156,7 +148,7 @@ private:
         return {keys_.data() + first, triangles_.data() + first, room_,
                 reinterpret_cast<unsigned long long*>(totals_.data()) + axis};
     }
-    // The lists, in room for so many crossings along an axis or more; returns how many there are.
+    // Makes the lists, with room for `room` crossings along an axis or for more; returns their numbers.
     [[nodiscard]] std::array<std::uint64_t, 3> list(std::uint64_t room) {
         for (;;) {
             room_ = room;
@@ -165,10 +157,9 @@ private:
             backend_.for_each(3, passes::clear_counts{totals_.data()});
             if (mesh_.count != 0)
                 device::with_runtime_errors([&] {
-                    device::launch_behind(device::append_crossings_kernel<>, device::num_blocks(mesh_.count),
-                                          device::threads_per_block, backend_.stream, stage::coarse_raster,
-                                          device::append_all_crossings{
-                                              pass<0>(), pass<1>(), pass<2>(), {list_of(0), list_of(1), list_of(2)}});
+                    device::append_crossings(pass<0>(), list_of(0), backend_.stream);
+                    device::append_crossings(pass<1>(), list_of(1), backend_.stream);
+                    device::append_crossings(pass<2>(), list_of(2), backend_.stream);
                 });
             const std::vector<std::uint64_t> found = totals_.to_host(backend_);
             const std::uint64_t most = std::max({found[0], found[1], found[2]});
