@@ -102,10 +102,10 @@ program=$(find_program "${program:-$build/tests/golden/golden_hashes$suffix}")
 tool_cases() {
     local format coverage target solid fill
     # Every format, of colours where it shows them; and of several values where it holds them.
-    for format in npy npz vox schem litematic binvox vti nrrd zarr glb obj ply stl 3mf xyz html nvdb vtu inp msh; do
+    for format in npy npz vox schem litematic binvox vti nrrd nii zarr glb obj ply stl 3mf xyz html nvdb vtu inp msh; do
         printf 'file.%s model.glb out.%s -r 40\n' "$format" "$format"
     done
-    for format in npy npz vti nrrd zarr html nvdb vtu; do
+    for format in npy npz vti nrrd nii zarr html nvdb vtu; do
         printf 'file.%s.values model.glb out.%s -r 28 -t occupancy,count,color,normal,material,depth\n' "$format" "$format"
     done
     printf 'file.pvti model.glb out.pvti -r 40 --pieces 3 -t count,normal\n'

@@ -143,7 +143,7 @@ def test_every_format_of_the_tool_is_written(scene, tmp_path):
     values = {"occupancy": surface, "color": color, "height": np.where(surface, np.float32(2.5), np.float32(0))}
     voxels = grid.ijk(surface)
     listed = (voxels, {n: a[grid.zyx(voxels)] for n, a in values.items() if n != "occupancy"})
-    assert {".npy", ".npz", ".vox", ".schem", ".binvox", ".vti", ".nrrd", ".zarr", ".glb", ".stl", ".nvdb"} < set(vp.formats())
+    assert {".npy", ".npz", ".vox", ".schem", ".binvox", ".vti", ".nrrd", ".nii", ".nii.gz", ".zarr", ".glb", ".stl", ".nvdb"} < set(vp.formats())
     for extension in vp.formats():
         if extension in (".npy", ".png", "{z}.png", ".html"):  # which other tests write
             continue

@@ -282,16 +282,17 @@ def save(
     "FOLDER/{z}.png": a grey picture of each layer, 0000.png and so on, y upwards: of bools 0 and 255, of floats from 0 to 1 in
     16 bits, uint8 and uint16 as they are. .npy: one array, as it is. .npz: the arrays by name, with origin and voxel_size.
     .nvdb (NanoVDB): the occupied voxels with their values, a grid for each name. .png: a picture, see render(). .html: a page,
-    see view(). .vti, .pvti, .nrrd and .zarr: all arrays. .vox, .schem, .litematic, .binvox, .glb, .obj, .ply, .stl, .3mf, .xyz: the occupied voxels, with the
-    first array of colours where the format has any. .vtu, .inp, .msh: a hexahedron for each occupied voxel, with all arrays
-    (.vtu) or with sets by the numbers of the array "material"; occupied=fractions >= 0.5 makes them of fractions.
+    see view(). .vti, .pvti, .nrrd, .nii, .nii.gz and .zarr: all arrays; .nii takes x, y and z for LPS, as the tool does. .vox,
+    .schem, .litematic, .binvox, .glb, .obj, .ply, .stl, .3mf, .xyz: the occupied voxels, with the first array of colours where
+    the format has any. .vtu, .inp, .msh: a hexahedron for each occupied voxel, with all arrays (.vtu) or with sets by the
+    numbers of the array "material"; occupied=fractions >= 0.5 makes them of fractions.
 
     Args:
         path: the file. Formats with one array a file write "a.NAME.nrrd" and so on for several.
         values: an array, a dict of arrays, or what sparse() returned.
         grid: the Grid of the values.
         occupied: bool (nz, ny, nx); by default the voxels whose value is not zero.
-        compression: zlib level of .vti, .vtu, .nrrd, .zarr, .3mf, .schem and .litematic, 0 to 9.
+        compression: zlib level of .vti, .vtu, .nrrd, .nii.gz, .zarr, .3mf, .schem and .litematic, 0 to 9.
         merge: .ply, .obj, .glb, .stl, .3mf: coplanar faces of equal colour become one rectangle.
         points: .ply holds the voxels' centres.
         levels: .zarr holds mip levels, too.
@@ -323,7 +324,7 @@ def save(
     if is_list(values):
         check_list(values, occupied, grid)
     target = os.fspath(path)
-    extension = os.path.splitext(target)[1].lower()
+    extension = ".nii.gz" if target.lower().endswith(".nii.gz") else os.path.splitext(target)[1].lower()
     if "{z}" in os.path.basename(target):
         extension = "{z}" + extension
     if extension not in _formats:

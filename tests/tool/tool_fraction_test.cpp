@@ -310,7 +310,8 @@ TEST(Fraction, EveryFormatOfValuesHoldsIt) {
     const scratch_folder folder;
     builder file;
     add(file, tilted);
-    for (const char* const output : {"o.npz", "o.vti", "o.pvti", "o.nrrd", "o.zarr", "o.png", "o.html"}) {
+    for (const char* const output :
+         {"o.npz", "o.vti", "o.pvti", "o.nrrd", "o.nii", "o.nii.gz", "o.zarr", "o.png", "o.html"}) {
         const outcome result = draw(folder, file, output, {"-t", "fraction", "--image-size", "64x48"});
         EXPECT_EQ(0, result.code) << output << ": " << result.err;
         EXPECT_EQ(std::string::npos, result.err.find("warning")) << output << ": " << result.err;

@@ -134,7 +134,7 @@ TEST(Measures, InEveryFormatOfArrays) {
     builder file;
     add(file, tilted);
     for (const std::string wanted : {"area", "centroid", "aperture_x", "aperture_z"})
-        for (const std::string extension : {".npy", ".npz", ".zarr", ".vti", ".nrrd", ".pvti"}) {
+        for (const std::string extension : {".npy", ".npz", ".zarr", ".vti", ".nrrd", ".nii", ".pvti"}) {
             if (wanted[0] == 'a' && wanted[1] == 'p' && extension != ".npy" && extension != ".npz" &&
                 extension != ".zarr")
                 continue;

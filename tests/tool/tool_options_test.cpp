@@ -44,6 +44,7 @@ std::set<std::string> all_options() {
             "--band N|whole",
             "--blocks FILE",
             "--slice-bits N",
+            "--space AXES",
             "--unsigned",
             "--corners",
             "--iso D",
@@ -242,7 +243,7 @@ TEST(Tool, OutputsDoNotRenameEachOther) {
         const outcome result = run(folder, arguments);
         EXPECT_EQ(0, result.code) << result.err;
     };
-    for (const char* extension : {".npy", ".npz", ".vti", ".nrrd"}) {
+    for (const char* extension : {".npy", ".npz", ".vti", ".nrrd", ".nii", ".nii.gz"}) {
         const std::string alone = folder / std::string("alone").append(extension);
         const std::string beside = folder / std::string("beside").append(extension);
         voxelize({"-o", alone});
@@ -305,6 +306,37 @@ TEST(Tool, StatsAccountForTheTime) {
         for (const char* stage : {"options", "read", "place", "write", "release"})
             EXPECT_TRUE(ms.contains(stage)) << stage;
     }
+}
+
+// Half a turn around z lies between the two, and nothing else; formats without a place for it refuse it.
+TEST(Tool, SpaceTurnsTheAffine) {
+    const scratch_folder folder;
+    gltf_test::small_world().write_glb(folder / "m.glb");
+    const auto nii = [&](const std::vector<std::string>& how) {
+        std::vector<std::string> arguments{folder / "m.glb", "-q", "-r", "16", "-o", folder / "o.nii"};
+        arguments.insert(arguments.end(), how.begin(), how.end());
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(0, result.code) << result.err;
+        return read_file(folder / "o.nii");
+    };
+    const auto number = [](const std::string& file, std::size_t at) {
+        float value = 0;
+        std::memcpy(&value, file.data() + at, sizeof(value));
+        return value;
+    };
+    const std::string lps = nii({"--space", "lps"}), ras = nii({"--space", "ras"});
+    EXPECT_TRUE(lps == nii({}));
+    constexpr std::size_t offsets = 268, rows = 280, row = 16;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float sign = axis < 2 ? -1.0F : 1.0F;
+        EXPECT_LT(0.0F, number(ras, rows + (row + 4) * axis));
+        for (const std::size_t at : {rows + (row + 4) * axis, rows + row * axis + 12, offsets + 4 * axis})
+            EXPECT_EQ(sign * number(ras, at), number(lps, at)) << at;
+    }
+    EXPECT_TRUE(lps.substr(352) == ras.substr(352));
+    const outcome refused = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "--space", "ras"});
+    EXPECT_EQ(1, refused.code);
+    EXPECT_NE(std::string::npos, refused.err.find("--space: .npy has no axes of patients")) << refused.err;
 }
 
 TEST(Tool, CompressionIsAChoice) {

@@ -182,7 +182,7 @@ TEST(ToolSparse, WritesTheSameShapesAsADenseRun) {
          "$.schem"},
         {"-r", "50", "--points", "-t", "occupancy", "-o", "$.ply", "-o", "$.vox", "-o", "$.xyz"},
         {"-r", "50", "--solid", "exterior", "-t", "occupancy", "-o", "$.glb", "-o", "$.binvox", "-o", "$.schem", "-o",
-         "$.nrrd"}};
+         "$.nrrd", "-o", "$.nii", "-o", "$.nii.gz"}};
     const scratch_folder folder;
     gltf_test::small_world().write_glb(folder / "m.glb");
     for (const std::vector<std::string>& one : runs) {

@@ -94,7 +94,8 @@ double bytes_to_write(const std::filesystem::path& output, const expected_result
         bricks = voxels / brick_voxels;
         bytes += voxels / bits_of_byte;
     }
-    if (is_one_of(extension, {".npz", ".vti", ".pvti", ".nrrd", ".schem", ".litematic", ".3mf", ".html", ".vtu"}))
+    if (is_one_of(extension,
+                  {".npz", ".vti", ".pvti", ".nrrd", ".nii.gz", ".schem", ".litematic", ".3mf", ".html", ".vtu"}))
         bytes += threads * bytes_of_thread;
     // Blocks of .vtu are gathered for all threads, in memory that grows.
     if (extension == ".vtu") bytes += std::min(threads * bytes_of_thread, 64 * voxels);
@@ -102,7 +103,8 @@ double bytes_to_write(const std::filesystem::path& output, const expected_result
         constexpr double chunk_voxels = 64 * 64 * 64, copies = 2.3; // as it is, and with room for what it becomes
         bytes += threads * (bytes_of_thread / 2 + copies * chunk_voxels * values.largest);
     }
-    const bool reads_tiles = is_one_of(extension, {".nvdb", ".vdb", ".vti", ".pvti", ".nrrd", ".zarr", "{z}.png"});
+    const bool reads_tiles =
+        is_one_of(extension, {".nvdb", ".vdb", ".vti", ".pvti", ".nrrd", ".nii", ".nii.gz", ".zarr", "{z}.png"});
     if (extension == "{z}.png") { // a layer's values, its pixels and the file of them, and files that wait
         constexpr double waiting = 4, of_pixel = 2;
         const double pixels = static_cast<double>(result.extent.x) * result.extent.y;

@@ -317,7 +317,8 @@ std::vector<std::filesystem::path> write_sparse_png(const sparse_volume& v, cons
 
 bool is_streamed(const std::string& extension) {
     return extension == ".npy" || extension == ".npz" || extension == ".vti" || extension == ".pvti" ||
-           extension == ".nrrd" || extension == ".zarr" || extension == "{z}.png";
+           extension == ".nrrd" || extension == ".nii" || extension == ".nii.gz" || extension == ".zarr" ||
+           extension == "{z}.png";
 }
 
 bool is_sparse_format(const std::filesystem::path& path) {

@@ -5,9 +5,9 @@
 // Writers of sparse volumes. .nvdb holds a grid for each channel (occupancy as a mask); .vdb see vdb.hpp. .npz holds
 // coords, (n, 3) int32 with columns x, y and z, in the Morton order of the voxels, and an array for each channel but
 // the occupancy; .npy holds the coords, and each channel in a file of its own beside it. Without write_options::lists
-// both hold the dense grid. .png is drawn from the bricks. .vti, .pvti, .nrrd, .zarr and these read the bricks as if
-// they were dense, piece by piece; formats of shapes (voxel_shape.hpp) read the bricks themselves. No output makes a
-// dense volume.
+// both hold the dense grid. .png is drawn from the bricks. .vti, .pvti, .nrrd, .nii, .nii.gz, .zarr and these read the
+// bricks as if they were dense, piece by piece; formats of shapes (voxel_shape.hpp) read the bricks themselves. No
+// output makes a dense volume.
 
 #include "model/sparse_volume.hpp"
 #include "write/formats/formats.hpp"

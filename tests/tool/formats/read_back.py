@@ -13,7 +13,7 @@ import json
 import pathlib
 import sys
 
-MODULES = ["numpy", "vtkmodules", "nrrd", "trimesh", "PIL", "pyvox", "midvoxio", "pygltflib", "mcschematic", "litemapy", "lib3mf", "lxml",
+MODULES = ["numpy", "vtkmodules", "nrrd", "nibabel", "SimpleITK", "trimesh", "PIL", "pyvox", "midvoxio", "pygltflib", "mcschematic", "litemapy", "lib3mf", "lxml",
            "networkx", "zarr", "tensorstore", "tinyvdb", "meshio"]
 
 
@@ -390,6 +390,55 @@ def check_nrrd(case, files):
         close(header["space origin"], np.array(case["origin"]) + size / 2, "space origin")
         close(header["space directions"][-3:], np.diag(size), "space directions")
         assert header["kinds"][-3:] == ["domain"] * 3 and len(header["kinds"]) == (3 if components == 1 else 4)
+
+
+def place_in_patient(case):
+    """The affine to LPS coordinates: from the numbers i, j, k of a voxel to its centre."""
+    import numpy as np
+
+    affine = np.diag([*case["voxel_size"], 1.0])
+    affine[:3, 3] = np.array(case["origin"]) + np.array(case["voxel_size"]) / 2
+    return affine if case["space"] == "lps" else np.diag([-1.0, -1, 1, 1]) @ affine
+
+
+def check_nii(case, files):
+    """nibabel has RAS coordinates, SimpleITK has LPS ones."""
+    import nibabel
+    import numpy as np
+    import SimpleITK
+
+    assert len(files) == len(case["channels"])
+    lps = place_in_patient(case)
+    ras = (np.diag([-1.0, -1, 1, 1]) @ lps).astype(np.float32)
+    for n, file in enumerate(files):
+        name, kind, components = case["channels"][n]
+        want = widened(expected(case, n))
+        image = nibabel.load(str(file))
+        values = np.asanyarray(image.dataobj)
+        if kind == "u8" and components > 2:
+            values = np.stack([values[c] for c in "RGBA"[:components]], axis=-1).transpose(2, 1, 0, 3)
+        elif components > 1:
+            assert image.header.get_intent()[0] == "vector" and values.shape[3:] == (1, components), values.shape
+            values = values[:, :, :, 0].transpose(2, 1, 0, 3)
+        else:
+            values = values.transpose(2, 1, 0)
+        same(np.ascontiguousarray(values), want, file.name)
+        for form in ("sform", "qform"):
+            affine, code = getattr(image.header, "get_" + form)(coded=True)
+            assert code == 2 and np.allclose(affine, ras, rtol=1e-6, atol=0), f"{file.name}: {form} {code} {affine}"
+        assert image.header["intent_name"].item().decode() == name[:15]
+        read = SimpleITK.ReadImage(str(file))
+        got = SimpleITK.GetArrayFromImage(read)
+        same(got.reshape(want.shape), want, f"{file.name} by SimpleITK")
+        assert np.allclose(read.GetSpacing()[:3], case["voxel_size"], rtol=1e-6), read.GetSpacing()
+        assert np.allclose(read.GetOrigin()[:3], lps[:3, 3], rtol=1e-6), read.GetOrigin()
+        signs = np.sign(np.diag(lps)[:3])
+        assert np.allclose(np.array(read.GetDirection()).reshape(3, 3), np.diag(signs)), read.GetDirection()
+
+
+def check_nii_gz(case, files):
+    assert all(file.read_bytes()[:2] == b"\x1f\x8b" for file in files)
+    check_nii(case, files)
 
 
 def srgb_tables():
@@ -1091,7 +1140,7 @@ def main():
     cases = json.loads((folder / "manifest.json").read_text())
     failures = checked = 0
     for case in cases:
-        files = case["files"].get("." + kind)
+        files = case["files"].get("." + kind.replace("_gz", ".gz"))
         if files is None:
             continue
         checked += 1

@@ -17,6 +17,7 @@ namespace {
 
 class Vti : public in_folder {};
 class Nrrd : public in_folder {};
+class Nifti : public in_folder {};
 
 std::string stream_of(const volume& v, const channel& c) {
     std::string all;
@@ -91,6 +92,101 @@ std::string array_bytes(const std::string& file, std::size_t element) {
         from += packed;
     }
     return all;
+}
+
+// The numbers of a header by their places in it, as nifti1.h has them.
+TEST_F(Nifti, HeaderSaysWhereTheVoxelsAre) {
+    volume v = make_volume({8, 4, 2});
+    v.voxel_size = {0.5, 0.25, 2};
+    v.add("fraction", scalar::f32);
+    fill(v, 0);
+    for (const patient_axes axes : {patient_axes::lps, patient_axes::ras}) {
+        write_options options;
+        options.space = axes;
+        write(v, folder_ / "a.nii", options);
+        const std::string file = read_file(folder_ / "a.nii");
+        const auto floats = [&](std::size_t at, std::size_t count) {
+            std::vector<float> values;
+            for (std::size_t n = 0; n < count; ++n) values.push_back(read_value<float>(file, at + 4 * n));
+            return values;
+        };
+        EXPECT_EQ(read_value<std::int32_t>(file, 0), 348);
+        const std::array<std::int16_t, 8> dim{3, 8, 4, 2, 1, 1, 1, 1};
+        for (std::size_t n = 0; n < dim.size(); ++n) EXPECT_EQ(read_value<std::int16_t>(file, 40 + 2 * n), dim[n]);
+        EXPECT_EQ(read_value<std::int16_t>(file, 70), 16); // of single precision
+        EXPECT_EQ(read_value<std::int16_t>(file, 72), 32);
+        EXPECT_EQ(floats(76, 4), (std::vector<float>{1, 0.5F, 0.25F, 2}));
+        EXPECT_EQ(floats(108, 3), (std::vector<float>{352, 1, 0}));
+        const float sign = axes == patient_axes::lps ? -1.0F : 1.0F;
+        const float x = sign * -1.25F, y = sign * 0.375F;
+        EXPECT_EQ(floats(256, 6), (std::vector<float>{0, 0, sign < 0 ? 1.0F : 0.0F, x, y, 11}));
+        EXPECT_EQ(floats(280, 12), (std::vector<float>{sign * 0.5F, 0, 0, x, 0, sign * 0.25F, 0, y, 0, 0, 2, 11}));
+        EXPECT_EQ(file.substr(328, 9), std::string("fraction\0", 9));
+        EXPECT_EQ(file.substr(344, 8), std::string("n+1\0\0\0\0\0", 8));
+        EXPECT_TRUE(file.substr(352) == stream_of(v, v.channels[0]));
+    }
+}
+
+// Components that are no colours are volumes one behind the other.
+TEST_F(Nifti, HoldsEveryTypeOneFileEach) {
+    const volume v = make_all_types();
+    const std::array<std::int16_t, 10> types{2, 2, 512, 768, 1280, 8, 1024, 16, 16, 64};
+    for (const std::string extension : {".nii", ".nii.gz"})
+        for (const int compression : {0, 6}) {
+            write_options options;
+            options.compression = compression;
+            const auto files = write(v, folder_ / ("A" + extension), options);
+            ASSERT_EQ(files.size(), v.channels.size());
+            for (std::size_t n = 0; n < files.size(); ++n) {
+                const channel& c = v.channels[n];
+                EXPECT_EQ(files[n], folder_ / ("A." + c.name + extension));
+                std::string file = read_file(files[n]);
+                if (extension == ".nii.gz") file = inflate_all(file, 15 + 16);
+                EXPECT_EQ(read_value<std::int16_t>(file, 70), types[static_cast<std::size_t>(c.type)]) << c.name;
+                EXPECT_EQ(read_value<std::int16_t>(file, 40), c.components == 1 ? 3 : 5);
+                EXPECT_EQ(read_value<std::int16_t>(file, 50), c.components);
+                const std::string together = stream_of(v, c);
+                const std::size_t each = together.size() / static_cast<std::size_t>(v.num_voxels() * c.components);
+                std::string apart;
+                for (int m = 0; m < c.components; ++m)
+                    for (std::size_t at = static_cast<std::size_t>(m) * each; at < together.size();
+                         at += each * static_cast<std::size_t>(c.components))
+                        apart += together.substr(at, each);
+                EXPECT_TRUE(file.substr(352) == apart) << c.name;
+            }
+        }
+}
+
+TEST_F(Nifti, ColoursAreRgbaOfEachVoxel) {
+    volume v = make_volume({5, 4, 3});
+    for (int components = 3; components <= 4; ++components) {
+        v.channels.clear();
+        v.add("color", scalar::u8, components);
+        fill(v, 0);
+        write(v, folder_ / "a.nii");
+        const std::string file = read_file(folder_ / "a.nii");
+        EXPECT_EQ(read_value<std::int16_t>(file, 40), 3);
+        EXPECT_EQ(read_value<std::int16_t>(file, 70), components == 3 ? 128 : 2304);
+        EXPECT_EQ(read_value<std::int16_t>(file, 72), 8 * components);
+        EXPECT_TRUE(file.substr(352) == stream_of(v, v.channels[0]));
+    }
+}
+
+TEST_F(Nifti, TellsWhereItsNumbersEnd) {
+    volume v = make_volume({32768, 1, 1});
+    v.add("occupancy", scalar::bit);
+    EXPECT_THROW(write(v, folder_ / "a.nii.gz"), write_error);
+    EXPECT_EQ(names(), std::vector<std::string>{});
+    std::vector<std::string> warnings;
+    write_options options;
+    options.warn = [&](const std::string& warning) { warnings.push_back(warning); };
+    v = make_occupancy({32767, 1, 1});
+    write(v, folder_ / "a.nii", options);
+    EXPECT_EQ(warnings, std::vector<std::string>{});
+    v.origin[0] = 4'700'000.125; // whose first centre is 1.5 voxels from the nearest float
+    write(v, folder_ / "a.nii", options);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_NE(warnings[0].find("which move voxels by up to 1.5"), std::string::npos) << warnings[0];
 }
 
 } // namespace

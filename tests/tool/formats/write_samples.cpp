@@ -97,7 +97,7 @@ void fill_shares(volume& v) {
 }
 
 std::vector<sample_case> make_cases() {
-    const std::vector<std::string> any{".npy", ".npz", ".vti", ".pvti", ".nrrd", ".zarr"};
+    const std::vector<std::string> any{".npy", ".npz", ".vti", ".pvti", ".nrrd", ".nii", ".nii.gz", ".zarr"};
     const std::vector<std::string> solid{".npy",   ".npz",       ".vti",    ".nrrd", ".zarr", ".vox",
                                          ".schem", ".litematic", ".binvox", ".glb",  ".obj",  ".ply",
                                          ".stl",   ".3mf",       ".xyz",    ".png",  ".html", ".vtu"};
@@ -120,8 +120,8 @@ std::vector<sample_case> make_cases() {
     add("upright", {26, 40, 51}, 17, true, false, {".litematic"}).options.up = up_axis::z;
     add("split_y", {270, 513, 33}, 997, true, false, {".vox"});
     add("empty", {9, 8, 7}, 0, false, false,
-        {".npy", ".npz", ".vti", ".nrrd", ".zarr", ".schem", ".litematic", ".binvox", ".glb", ".obj", ".ply", ".stl",
-         ".3mf", ".xyz", ".png", ".html", ".vtu", ".inp", ".msh"});
+        {".npy", ".npz", ".vti", ".nrrd", ".nii", ".zarr", ".schem", ".litematic", ".binvox", ".glb",
+         ".obj", ".ply", ".stl", ".3mf",  ".xyz", ".png",  ".html",  ".vtu",       ".inp",    ".msh"});
     add("merged", {40, 33, 21}, 2, false, false, meshes).options.merge_faces = true;
     add("merged_colors", {40, 33, 21}, 1, true, false, meshes).options.merge_faces = true;
     add("pieces", {37, 23, 11}, 5, true, false, meshes).options.faces_per_file = 1000;
@@ -150,6 +150,7 @@ std::vector<sample_case> make_cases() {
     sample_case& raw = add("raw", {13, 7, 5}, 2, false, true, any);
     raw.extensions.emplace_back(".vtu");
     raw.options.compression = 0;
+    raw.options.space = patient_axes::ras;
     if (has_zstd()) add("zstd", {150, 70, 90}, 5, true, false, {".zarr"}).options.zstd = true;
     // Channels of every type that .nvdb has. Floats come first, since tinyvdb reads the first grid alone.
     sample_case& grids = add("grids", {150, 17, 40}, 5, false, false, {".nvdb"});
@@ -193,6 +194,7 @@ std::string describe(const sample_case& c, const std::map<std::string, std::vect
     std::string out = "  {\"name\": \"" + c.name + "\", \"density\": " + std::to_string(c.density);
     out += ", \"clay\": [" + list_of(clay) + "], \"up\": \"";
     out += c.options.up == up_axis::y ? "y" : "z";
+    out += std::string("\", \"space\": \"") + (c.options.space == patient_axes::lps ? "lps" : "ras");
     out += std::string("\", \"merge\": ") + (c.options.merge_faces ? "true" : "false") +
            ", \"points\": " + (c.options.points ? "true" : "false");
     out += ", \"extent\": [" + list_of(c.v.extent) + "], \"origin\": [" + list_of(c.v.origin);

@@ -39,6 +39,7 @@ struct raw_options {
     bool report = false;
     std::optional<double> threshold;
     std::optional<int> neighbours;
+    std::optional<patient_axes> space;
     std::vector<std::string> targets;
     bool no_edges = false;
     bool no_ground = false;

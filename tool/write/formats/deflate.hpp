@@ -78,7 +78,7 @@ struct running_crc {
     void add(const compressed_piece& piece);
 };
 
-// Bytes that a thread compresses at once in streams whose readers never see the pieces (.npz, .nrrd).
+// Bytes that a thread compresses at once in streams whose readers never see the pieces (.npz, .nrrd, .nii.gz).
 inline constexpr std::size_t compressed_piece_bytes = std::size_t{256} << 10;
 
 // Compresses a channel's stream, after `head`, on `threads` threads and hands the pieces over in order, from the

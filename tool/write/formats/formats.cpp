@@ -10,8 +10,8 @@
 #include "msh.hpp"
 #include "npy.hpp"
 #include "npz.hpp"
-#include "nrrd.hpp"
 #include "png.hpp"
+#include "scanner_images.hpp"
 #include "schem.hpp"
 #include "slices.hpp"
 #include "text.hpp"
@@ -56,6 +56,10 @@ constexpr auto all_formats = std::to_array<format>({
     {".pvti", "the same in pieces of some layers each, OUT.1.vti, ...; see --pieces", false, true, false, false, false,
      false, true},
     {".nrrd", "NRRD for 3D Slicer and teem; OUT.CHANNEL.nrrd for several", false, true, false, false},
+    {".nii", "NIfTI-1 for nibabel, FSL and 3D Slicer; OUT.CHANNEL.nii for several; see --space", false, true, false,
+     false, false, false, false, false, false, false, false, true},
+    {".nii.gz", "the same, compressed", false, true, false, false, false, false, false, false, false, false, false,
+     true},
     {".zarr", "Zarr 3 group with a compressed array for each channel, in shards of 256^3; see --levels", false, true,
      false, false, false, true},
     {".glb", "glTF mesh of the voxels' outer sides, with colours; see --merge", true, false, true, false},
@@ -91,6 +95,8 @@ constexpr auto all_writers = std::to_array<writer>({
     {write_vti},
     {write_pvti, nullptr, pvti_names},
     {write_nrrd, nullptr, channel_names},
+    {write_nii, nullptr, channel_names},
+    {write_nii, nullptr, channel_names},
     {write_zarr, nullptr, zarr_names},
     {nullptr, write_glb, mesh_names},
     {nullptr, write_obj, mesh_names},

@@ -23,14 +23,19 @@ namespace voxelize {
 
 struct block_list; // blocks.hpp
 
+// The axes of a patient that the model's x, y and z are: to the left, to the back and to the head as in DICOM, or to
+// the right, to the front and to the head.
+enum class patient_axes : std::uint8_t { lps, ras };
+
 struct write_options {
-    // zlib level of .npz, .vti, .vtu, .nrrd, .zarr, .3mf, {z}.png, .schem, .litematic: 0 stores (the last two: 1), 9 is
-    // smallest
+    // zlib level of .npz, .vti, .vtu, .nrrd, .zarr, .3mf, {z}.png, .schem, .litematic, .nii.gz: 0 stores (the last
+    // three: 1), 9 is smallest
     int compression = 1;
-    bool zstd = false;   // .zarr: Zstandard instead of gzip, where has_zstd()
-    int slice_bits = 0;  // {z}.png: bits of a pixel, 8 or 16; 0: as slices.hpp says
-    bool levels = false; // .zarr: each channel with its mip levels, an OME-Zarr multiscale group
-    int pieces = 0;      // .pvti, .nvdb: slabs along z, each a piece or a grid of each channel; 0: as these say:
+    bool zstd = false;                      // .zarr: Zstandard instead of gzip, where has_zstd()
+    patient_axes space = patient_axes::lps; // .nrrd, .nii, .nii.gz
+    int slice_bits = 0;                     // {z}.png: bits of a pixel, 8 or 16; 0: as slices.hpp says
+    bool levels = false;                    // .zarr: each channel with its mip levels, an OME-Zarr multiscale group
+    int pieces = 0; // .pvti, .nvdb: slabs along z, each a piece or a grid of each channel; 0: as these say:
     std::uint64_t piece_bytes = 1 << 30;         // .pvti: of values in a piece, about
     std::uint64_t leaves_per_grid = 0xffff'ffff; // .nvdb: most bricks in a grid; the format has no more
     up_axis up = up_axis::y;                     // stands upright in .vox, .schem, .litematic; glTF's is y
@@ -68,6 +73,7 @@ struct format {
     bool has_threshold = false;   // obeys write_options::threshold
     bool has_materials = false;   // holds the numbers of materials, whether it holds other channels or not
     bool has_layers = false;      // a file for each layer of one target: obeys write_options::slice_bits
+    bool has_space = false;       // obeys write_options::space
 };
 
 // True if voxels of this size are cubes, but for what fitting a grid loses by rounding.
@@ -86,9 +92,9 @@ struct format {
 [[nodiscard]] const format* find_format(const std::filesystem::path& path);
 
 // Writes the volume and returns the paths of the files, in channel order: one, or several where the format holds one
-// channel a file (OUT.CHANNEL.npy, OUT.CHANNEL.nrrd). Throws write_error when the extension is unknown, a channel that
-// the format needs is missing, the volume does not fit the format, or the disk refuses; std::invalid_argument when the
-// volume itself is inconsistent. In all these cases no file of this call is left behind.
+// channel a file (OUT.CHANNEL.npy, OUT.CHANNEL.nii.gz). Throws write_error when the extension is unknown, a channel
+// that the format needs is missing, the volume does not fit the format, or the disk refuses; std::invalid_argument when
+// the volume itself is inconsistent. In all these cases no file of this call is left behind.
 std::vector<std::filesystem::path> write(const volume& v, const std::filesystem::path& path,
                                          const write_options& options = {});
 
@@ -120,7 +126,7 @@ enum class held_as : std::uint8_t { grid, list, unknown };
 void check_replaceable(const std::filesystem::path& path);
 
 // Writes occupied voxels and their colours (voxel_shape.hpp), for formats that show those alone: all but .npy, .npz,
-// .vti, .pvti, .nrrd, .zarr, .png, .html, .nvdb and .vdb. There is no threshold here.
+// .vti, .pvti, .nrrd, .nii, .nii.gz, .zarr, .png, .html, .nvdb and .vdb. There is no threshold here.
 class voxel_shape;
 std::vector<std::filesystem::path> write(const voxel_shape& v, const std::filesystem::path& path,
                                          const write_options& options);

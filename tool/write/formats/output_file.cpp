@@ -116,10 +116,23 @@ bool is_standard_output(const fs::path& path) {
            std::all_of(whole.begin(), whole.end() - 2, [](unsigned char c) { return std::isalnum(c) != 0; });
 }
 
+namespace {
+
+// The extension as it is written; both parts of "a.nii.gz".
+std::string whole_extension(const fs::path& path) {
+    const auto is = [](const std::string& extension, std::string_view word) {
+        return std::equal(extension.begin(), extension.end(), word.begin(), word.end(),
+                          [](unsigned char a, char b) { return std::tolower(a) == b; });
+    };
+    const std::string last = path.extension().string(), before = path.stem().extension().string();
+    return is(last, ".gz") && is(before, ".nii") ? before + last : last;
+}
+
+} // namespace
+
 std::string lower_extension(const std::filesystem::path& path) {
     const std::string whole = path.string();
-    std::string extension =
-        is_standard_output(path) ? '.' + whole.substr(0, whole.size() - 2) : path.extension().string();
+    std::string extension = is_standard_output(path) ? '.' + whole.substr(0, whole.size() - 2) : whole_extension(path);
     for (char& c : extension)
         if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
     if (path.filename().string().find(layer_place) != std::string::npos) extension.insert(0, layer_place);
@@ -128,7 +141,8 @@ std::string lower_extension(const std::filesystem::path& path) {
 
 fs::path with_word(const fs::path& path, const std::string& word) {
     if (is_standard_output(path)) throw write_error(path, "standard output holds one file, and this is several");
-    return path.parent_path() / (path.stem().string() + "." + word + path.extension().string());
+    const std::string name = path.filename().string(), extension = whole_extension(path);
+    return path.parent_path() / (name.substr(0, name.size() - extension.size()) + "." + word + extension);
 }
 
 } // namespace voxelize

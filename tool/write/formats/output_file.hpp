@@ -29,8 +29,9 @@ static_assert(std::endian::native == std::endian::little, "the writers copy valu
 // In the name of an output: what a layer's number takes the place of.
 inline constexpr std::string_view layer_place = "{z}";
 
-// The path's extension with its dot and in lower case ("A.NPZ": ".npz"), as formats are found by it; of an output on
-// standard output ("npy:-") that of its format; "{z}.png" where the file's name has a place for layers.
+// The path's extension with its dot and in lower case ("A.NPZ": ".npz", "a.nii.gz": ".nii.gz"), as formats are found by
+// it; of an output on standard output ("npy:-") that of its format; "{z}.png" where the file's name has a place for
+// layers.
 [[nodiscard]] std::string lower_extension(const std::filesystem::path& path);
 
 // "out.npy" and "color": "out.color.npy", the name of a file that is one of several of an output.
