@@ -52,11 +52,12 @@ struct crossing_toggler {
 };
 
 // Adds to the first voxel behind the crossing, of its body; a later pass sums them up (solid/device/winding.cuh). A row
-// has a place a voxel, and one behind it.
+// has a place a voxel, and one behind it. Marks crossed rows by a byte each.
 struct winding_adder {
     static constexpr bool is_listing = false;
     std::int32_t* windings;
-    std::int32_t* of_cones;  // what of it is of cones
+    std::int32_t* of_cones;  // what of it is of cones; null: not wanted
+    std::uint8_t* marked;    // by body and row
     std::uint64_t of_body;   // places
     bool is_split;           // a body a draw
     std::uint32_t num_draws; // the cones of body k are draw num_draws + k
@@ -67,8 +68,9 @@ struct winding_adder {
         const std::uint64_t body = is_cone ? draw - num_draws : is_split ? draw : 0;
         const std::uint64_t row_places = static_cast<std::uint64_t>(grid.extent.x) + 1;
         const std::uint64_t place = body * of_body + row * row_places + grid.position(first);
+        marked[body * grid.num_rows() + row] = 1;
         atomicAdd(windings + place, winding > 0 ? 1 : -1);
-        if (is_cone) atomicAdd(of_cones + place, winding > 0 ? 1 : -1);
+        if (is_cone && of_cones != nullptr) atomicAdd(of_cones + place, winding > 0 ? 1 : -1);
     }
 };
 

@@ -119,7 +119,7 @@ struct solid_entries<draw<Mesh, VertexShader, SolidShader>> {
         if (plan.options.repair == repair::exterior && !plan.options.with_cover)
             m.sides = side_memory::take(a, plan.g.extent);
         if (plan.options.repair == repair::vote) m.vote = vote_memory::take(a, plan.g.extent);
-        if (plan.options.repair == repair::winding) m.winding = winding_memory::take(a, rows(), num_bodies());
+        if (plan.options.repair == repair::winding) m.winding = winding_memory::take(a, rows(), num_bodies(), cones);
         return m;
     }
     [[nodiscard]] body_shaders<SolidShader> shaders(const memory& m, cudaStream_t stream) const {
@@ -246,8 +246,7 @@ private:
         const bool is_winding = plan.options.repair == repair::winding;
         if (is_winding) {
             m.winding.clear(rows(), num_bodies(), stream);
-            const winding_adder sink{m.winding.windings, m.winding.of_cones, m.winding.of_body(rows()), is_split(),
-                                     static_cast<std::uint32_t>(draws.size())};
+            const winding_adder sink = m.winding.adder(rows(), is_split(), static_cast<std::uint32_t>(draws.size()));
             emit_crossings(stored_triangles{geo, rows(), plan.num_primitives, num_drawn(geometry_of)}, rows(), sink,
                            m.kept.with(state), state, stream);
         }

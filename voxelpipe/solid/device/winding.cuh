@@ -7,17 +7,22 @@
 
 #include <voxelpipe/solid/device/bit_sweeps.cuh>
 #include <voxelpipe/solid/device/emit_crossings.cuh>
+#include <voxelpipe/solid/device/solid_cones.cuh>
 #include <voxelpipe/solid/device/sweep_rows.cuh>
 #include <voxelpipe/solid/device/winding_bricks.cuh>
 
+#include <algorithm>
 #include <cstdint>
+#include <span>
 
 namespace voxelpipe::device {
 
-// Winding numbers of all bodies, a place a voxel and one behind each row; and bits and marks of one body.
+// Winding numbers of all bodies, a place a voxel and one behind each row, where the row is marked; and bits and marks
+// of one body.
 struct winding_memory {
     std::int32_t* windings = nullptr;
-    std::int32_t* of_cones = nullptr;
+    std::int32_t* of_cones = nullptr; // null if no hole has lids but its cone
+    std::uint8_t* marked = nullptr;   // rows that are crossed
     word* inside = nullptr;
     word* on_cones = nullptr;       // voxels whose samples lie on a cone
     std::uint32_t* marks = nullptr; // core::winding_mark, of each brick
@@ -29,25 +34,38 @@ struct winding_memory {
     [[nodiscard]] static std::uint64_t num_bricks(const row_grid& grid) {
         return winding_boxes{grid.extent, winding_brick}.count();
     }
-    [[nodiscard]] static winding_memory take(arena& memory, const row_grid& grid, std::uint32_t bodies) {
+    // cones: of the bodies.
+    [[nodiscard]] static winding_memory take(arena& memory, const row_grid& grid, std::uint32_t bodies,
+                                             std::span<const cone_part> cones) {
         winding_memory m;
         m.windings = memory.take<std::int32_t>(of_body(grid) * bodies);
-        m.of_cones = memory.take<std::int32_t>(of_body(grid) * bodies);
+        if (std::any_of(cones.begin(), cones.end(), [](const cone_part& c) { return c.tree.num_nodes != 0; }))
+            m.of_cones = memory.take<std::int32_t>(of_body(grid) * bodies);
+        m.marked = memory.take<std::uint8_t>(grid.num_rows() * bodies);
         m.inside = memory.take<word>(bit_box{grid.extent}.num_words());
         m.on_cones = memory.take<word>(bit_box{grid.extent}.num_words());
         m.marks = memory.take<std::uint32_t>(num_bricks(grid));
         m.work = winding_work::take(memory, grid.extent);
         return m;
     }
+    [[nodiscard]] winding_adder adder(const row_grid& grid, bool is_split, std::uint32_t num_draws) const {
+        return {windings, of_cones, marked, of_body(grid), is_split, num_draws};
+    }
     void clear(const row_grid& grid, std::uint32_t bodies, cudaStream_t stream) const {
         const std::size_t bytes = of_body(grid) * bodies * sizeof(std::int32_t);
         check(cudaMemsetAsync(windings, 0, bytes, stream), stage::fine_raster);
-        check(cudaMemsetAsync(of_cones, 0, bytes, stream), stage::fine_raster);
+        if (of_cones != nullptr) check(cudaMemsetAsync(of_cones, 0, bytes, stream), stage::fine_raster);
+        check(cudaMemsetAsync(marked, 0, grid.num_rows() * bodies, stream), stage::fine_raster);
     }
     void clear_body(const row_grid& grid, cudaStream_t stream) const {
         check(cudaMemsetAsync(on_cones, 0, bit_box{grid.extent}.num_words() * sizeof(word), stream),
               stage::fine_raster);
         check(cudaMemsetAsync(marks, 0, num_bricks(grid) * sizeof(std::uint32_t), stream), stage::fine_raster);
+    }
+    // What is known of a body whose numbers have been summed up.
+    [[nodiscard]] winding_input input(const row_grid& grid, std::uint32_t body, fill_rule rule) const {
+        const std::uint64_t first = body * of_body(grid);
+        return {windings + first, of_cones == nullptr ? nullptr : of_cones + first, on_cones, marks, grid, rule};
     }
 };
 
@@ -93,9 +111,10 @@ __global__ __launch_bounds__(threads_per_block) void mark_bricks_kernel(const __
 }
 
 // Steps at crossings become winding numbers, and bits of those that the rule calls inside. A warp a row. of_cones: or
-// null.
+// null. marked: rows that are not 0 throughout.
 template <class State>
 __global__ __launch_bounds__(threads_per_block) void sum_windings_kernel(std::int32_t* windings, std::int32_t* of_cones,
+                                                                         const std::uint8_t* marked,
                                                                          const __grid_constant__ row_grid grid,
                                                                          fill_rule rule, word* inside, State* state) {
     const unsigned lane = threadIdx.x % 32;
@@ -105,6 +124,10 @@ __global__ __launch_bounds__(threads_per_block) void sum_windings_kernel(std::in
     std::uint32_t most = 0;
     for (std::uint64_t row = std::uint64_t{blockIdx.x} * (threads_per_block / 32) + warp_in_block();
          row < grid.num_rows(); row += std::uint64_t{gridDim.x} * (threads_per_block / 32)) {
+        if (marked[row] == 0) {
+            for (std::uint32_t i = lane; i < box.words_x(); i += 32) inside[row * box.words_x() + i] = 0;
+            continue;
+        }
         std::int32_t* const of_row = windings + row * (std::uint64_t{nx} + 1);
         std::int32_t before = 0;
         for (std::uint32_t x0 = 0; x0 < nx; x0 += 32) {
@@ -153,11 +176,13 @@ template <int = 0>
 void add_windings(const winding_memory& m, const core::winding_view& tree, const geometry& geo,
                   const winding_triangles& triangles, const row_grid& grid, fill_rule rule, solid_extent extent,
                   std::uint32_t body, word* mask, pipeline_state* state, cudaStream_t stream) {
-    const std::uint64_t first = body * winding_memory::of_body(grid);
+    const winding_input in = m.input(grid, body, rule);
     const bit_box box{grid.extent};
     const unsigned blocks = fill_device(grid.num_rows() * 32, 16);
     sum_windings_kernel<pipeline_state><<<blocks, threads_per_block, 0, stream>>>(
-        m.windings + first, tree.num_triangles != 0 ? m.of_cones + first : nullptr, grid, rule, m.inside, state);
+        m.windings + body * winding_memory::of_body(grid),
+        m.of_cones == nullptr || tree.num_triangles == 0 ? nullptr : m.of_cones + body * winding_memory::of_body(grid),
+        m.marked + body * grid.num_rows(), grid, rule, m.inside, state);
     check(cudaGetLastError(), stage::fine_raster);
     if (tree.num_triangles != 0) {
         m.clear_body(grid, stream);
@@ -166,8 +191,7 @@ void add_windings(const winding_memory& m, const core::winding_view& tree, const
         mark_bricks_kernel<pipeline_state><<<fill_device(all * 32, 16), threads_per_block, 0, stream>>>(
             geo, grid, triangles, m.on_cones, m.marks, state);
         check(cudaGetLastError(), stage::fine_raster);
-        decide_windings(tree, {m.windings + first, m.of_cones + first, m.on_cones, m.marks, grid, rule}, m.work,
-                        m.inside, state, stream);
+        decide_windings(tree, in, m.work, m.inside, state, stream);
     }
     join_cover_kernel<pipeline_state><<<fill_device(box.num_words(), 16), threads_per_block, 0, stream>>>(
         m.inside, box.num_words(), extent, mask, state);

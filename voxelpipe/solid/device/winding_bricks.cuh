@@ -91,7 +91,8 @@ struct winding_work {
 
 // What is known of the samples of one body.
 struct winding_input {
-    const std::int32_t *windings, *of_cones;
+    const std::int32_t* windings;
+    const std::int32_t* of_cones; // null: cones are the only lids of all holes, and do not count apart
     const word* on_cones;
     const std::uint32_t* marks;
     row_grid grid;
@@ -99,13 +100,14 @@ struct winding_input {
 
     [[nodiscard]] VOXELPIPE_HD core::winding_sample sample(const glm::ivec3& v, std::uint32_t mark) const {
         const std::uint64_t i = place(v);
-        return {windings[i], of_cones[i], (mark & core::has_samples_on_cones) != 0 && is_on_cone(v)};
-    }
-    [[nodiscard]] VOXELPIPE_HD std::uint64_t place(const glm::ivec3& v) const {
-        return grid.row(v.y, v.z) * (static_cast<std::uint64_t>(grid.extent.x) + 1) + static_cast<std::uint64_t>(v.x);
+        return {windings[i], of_cones == nullptr ? 0 : of_cones[i],
+                (mark & core::has_samples_on_cones) != 0 && is_on_cone(v)};
     }
 
 private:
+    [[nodiscard]] VOXELPIPE_HD std::uint64_t place(const glm::ivec3& v) const {
+        return grid.row(v.y, v.z) * (static_cast<std::uint64_t>(grid.extent.x) + 1) + static_cast<std::uint64_t>(v.x);
+    }
     [[nodiscard]] VOXELPIPE_HD bool is_on_cone(const glm::ivec3& v) const {
         return (on_cones[bit_box{grid.extent}.first_word(v.y, v.z) + static_cast<std::uint64_t>(v.x / 32)] >> v.x % 32 &
                 1) != 0;
@@ -157,11 +159,10 @@ __global__ __launch_bounds__(64) void judge_bricks_kernel(const core::winding_vi
         const std::uint64_t brick = bricks.number(first);
         const std::uint32_t mark = in.marks[brick];
         const core::winding_samples samples = bricks.samples(first, in.grid.fraction);
-        const std::uint64_t middle =
-            in.place(first + glm::ivec3(samples.middle(0), samples.middle(1), samples.middle(2)));
+        const core::winding_sample middle =
+            in.sample(first + glm::ivec3(samples.middle(0), samples.middle(1), samples.middle(2)), mark);
         std::uint32_t near[core::near_holes::most];
-        core::winding_verdict known =
-            core::judge_brick(tree, samples, in.windings[middle], in.of_cones[middle], mark, in.rule, near);
+        core::winding_verdict known = core::judge_brick(tree, samples, middle.k, middle.k_cones, mark, in.rule, near);
         if (known.kind == core::winding_verdict::beyond && known.whole == 0) continue; // as the bits are
         const bool is_whole =
             (known.kind == core::winding_verdict::outside || known.kind == core::winding_verdict::inside) &&
