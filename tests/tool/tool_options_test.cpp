@@ -336,7 +336,7 @@ TEST(Tool, SpaceTurnsTheAffine) {
     EXPECT_TRUE(lps.substr(352) == ras.substr(352));
     const outcome refused = run(folder, {folder / "m.glb", "-o", folder / "o.npy", "--space", "ras"});
     EXPECT_EQ(1, refused.code);
-    EXPECT_NE(std::string::npos, refused.err.find("--space: .npy has no axes of patients")) << refused.err;
+    EXPECT_NE(std::string::npos, refused.err.find("--space: .npy has no axes of patients; .nrrd, .nii")) << refused.err;
 }
 
 TEST(Tool, CompressionIsAChoice) {

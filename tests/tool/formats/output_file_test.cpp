@@ -150,7 +150,7 @@ TEST_F(OutputFile, EveryWriterReportsAFullDisk) {
         if (f.extension == ".zarr") continue; // a folder: zarr_test.cpp
         const auto link = folder_ / ("full" + std::string(f.extension));
         std::vector<std::filesystem::path> links{link};
-        if (f.extension == ".npy" || f.has_space || f.extension == ".nrrd") // one file for each channel
+        if (f.extension == ".npy" || f.has_space) // one file for each channel
             links = {folder_ / ("full.occupancy" + std::string(f.extension)),
                      folder_ / ("full.color" + std::string(f.extension))};
         if (f.has_layers) links = {folder_ / "full0000.png"};

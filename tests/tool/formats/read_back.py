@@ -379,8 +379,13 @@ def check_msh(case, files):
 
 
 def check_nrrd(case, files):
+    """pynrrd has the numbers of the header, SimpleITK what they mean in LPS coordinates."""
     import nrrd
     import numpy as np
+    import SimpleITK
+
+    lps = place_in_patient(case)
+    space = {"lps": "left-posterior-superior", "ras": "right-anterior-superior"}[case["space"]]
 
     for n, file in enumerate(files):
         _, _, components = case["channels"][n]
@@ -390,6 +395,12 @@ def check_nrrd(case, files):
         close(header["space origin"], np.array(case["origin"]) + size / 2, "space origin")
         close(header["space directions"][-3:], np.diag(size), "space directions")
         assert header["kinds"][-3:] == ["domain"] * 3 and len(header["kinds"]) == (3 if components == 1 else 4)
+        assert header["space"] == space, header["space"]
+        read = SimpleITK.ReadImage(str(file))
+        same(SimpleITK.GetArrayFromImage(read), widened(expected(case, n)), f"{file.name} by SimpleITK")
+        close(read.GetSpacing(), case["voxel_size"], "spacing")
+        close(read.GetOrigin(), lps[:3, 3], "origin")
+        close(read.GetDirection(), np.diag(np.sign(np.diag(lps)[:3])).ravel(), "direction")
 
 
 def place_in_patient(case):

@@ -286,13 +286,18 @@ TEST_F(Nrrd, HeaderSaysWhereTheVoxelsAre) {
     const std::string header = std::string("\n").append(file, 0, end + 1);
     EXPECT_EQ(header.substr(0, 10), "\nNRRD0004\n");
     for (const char* line :
-         {"type: uint8", "dimension: 4", "space dimension: 3", "sizes: 4 8 4 2",
+         {"type: uint8", "dimension: 4", "space: left-posterior-superior", "sizes: 4 8 4 2",
           "space directions: none (0.5,0,0) (0,0.25,0) (0,0,2)", "centerings: none cell cell cell",
           "kinds: RGBA-color domain domain domain", "encoding: raw", "space origin: (-1.25,0.375,11)"})
         EXPECT_NE(header.find(std::string("\n").append(line).append("\n")), std::string::npos) << line << "\n"
                                                                                                << header;
-    EXPECT_EQ(header.find("endian"), std::string::npos); // bytes have no order
+    EXPECT_EQ(header.find("endian"), std::string::npos);          // bytes have no order
+    EXPECT_EQ(header.find("space dimension"), std::string::npos); // the name of a space has it
     EXPECT_TRUE(file.substr(end + 2) == stream_of(v, v.channels[0]));
+    options.space = patient_axes::ras; // the same numbers in another space
+    write(v, folder_ / "a.nrrd", options);
+    const std::string name = "left-posterior", named = read_file(folder_ / "a.nrrd");
+    EXPECT_EQ(named, std::string(file).replace(file.find(name), name.size(), "right-anterior"));
 }
 
 TEST_F(Nrrd, HoldsEveryTypeOneFileEach) {

@@ -446,10 +446,11 @@ void describe_output(CLI::App& app, command_line& options, raw_options& raw) {
             ""))
         ->option_text("N")
         ->group("Files");
-    add_choice(app, "--space", raw.space, {{"lps", patient_axes::lps}, {"ras", patient_axes::ras}},
-               "The axes of a patient that x, y and z of the model are, in .nii and .nii.gz: lps (left, posterior, "
-               "superior), as 3D Slicer and ITK have those of meshes, or ras (right, anterior, superior), as FSL and "
-               "FreeSurfer have theirs. Default: lps")
+    add_choice(
+        app, "--space", raw.space, {{"lps", patient_axes::lps}, {"ras", patient_axes::ras}},
+        "The axes of a patient that x, y and z of the model are, in .nrrd, .nii and .nii.gz: lps (left, posterior, "
+        "superior), as 3D Slicer and ITK have those of meshes, or ras (right, anterior, superior), as FSL and "
+        "FreeSurfer have theirs. Default: lps")
         ->option_text("AXES")
         ->group("Files");
     app.add_option(

@@ -37,7 +37,7 @@ std::string_view component_kind(const channel& c) {
     return colour ? "RGBA-color" : "4-vector";
 }
 
-std::string header_of(const volume& v, const channel& c, bool compress) {
+std::string header_of(const volume& v, const channel& c, patient_axes axes, bool compress) {
     const auto& s = v.voxel_size;
     const bool vector = c.components > 1;
     std::string text = "NRRD0004\n";
@@ -45,7 +45,7 @@ std::string header_of(const volume& v, const channel& c, bool compress) {
     text += "content: " + c.name + "\n";
     text += "type: " + std::string(nrrd_type(c.type)) + "\n";
     text += std::string("dimension: ") + (vector ? "4" : "3") + "\n";
-    text += "space dimension: 3\n";
+    text += std::string("space: ") + (axes == patient_axes::lps ? "left-posterior" : "right-anterior") + "-superior\n";
     text += "sizes:";
     if (vector) text.append(" ").append(std::to_string(c.components));
     for (const std::int64_t n : v.extent) text.append(" ").append(std::to_string(n));
@@ -220,7 +220,7 @@ std::vector<std::filesystem::path> write_nrrd(const volume& v, const std::filesy
     for (const channel& c : v.channels) {
         files.push_back(std::make_unique<output_file>(channel_path(path, v, c)));
         output_file& out = *files.back();
-        out.write(header_of(v, c, compress));
+        out.write(header_of(v, c, options.space, compress));
         if (compress)
             write_gzip_image(out, {}, v, {&c, 1}, options, meter);
         else

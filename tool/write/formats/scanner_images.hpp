@@ -7,7 +7,7 @@
 // voxel.
 //
 // NRRD (teem's "nearly raw raster data"), version 4 for its orientation fields: raw or gzip encoding, components as a
-// first axis.
+// first axis. Its space is that of the model, whose name write_options::space says.
 //
 // NIfTI-1 in a single file (.nii), or the same in gzip (.nii.gz): its affine leads to RAS coordinates, in single
 // precision, as sform and as qform. Three or four bytes a voxel are RGB24 or RGBA32; of other components each is a
