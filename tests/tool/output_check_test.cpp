@@ -105,6 +105,16 @@ TEST_F(OutputCheck, FormatsSayWhichFilesTheyWrite) {
     EXPECT_EQ((list{"d/x.occupancy.nrrd", "d/x.count.nrrd"}), names("d/x.nrrd", two));
     EXPECT_EQ((list{"x.count.npy", "x.npy"}), names("x.npy", two, held_as::list));
     EXPECT_EQ((list{"x.count.npy", "x.npy", "x.occupancy.npy"}), names("x.npy", two, held_as::unknown));
+    volume faces = shape_of({"fraction"});
+    faces.faces = {shape_of({"aperture_x"}), shape_of({"aperture_z"})};
+    EXPECT_EQ((list{"x.vti", "x.aperture_x.vti", "x.aperture_z.vti"}), names("x.vti", faces));
+    EXPECT_EQ((list{"x.fraction.nii.gz", "x.aperture_x.nii.gz", "x.aperture_z.nii.gz"}), names("x.nii.gz", faces));
+    EXPECT_EQ(list{"x.npz"}, names("x.npz", faces));
+    faces.channels.clear();
+    EXPECT_EQ((list{"x.aperture_x.vti", "x.aperture_z.vti"}), names("x.vti", faces));
+    faces.faces.resize(1);
+    EXPECT_EQ(list{"x.vti"}, names("x.vti", faces));
+    EXPECT_EQ(list{"x.npy"}, names("x.npy", faces));
     write_options pieces;
     pieces.pieces = 2;
     EXPECT_EQ((list{"x.pvti", "x.1.vti", "x.2.vti"}), names("x.pvti", one, held_as::grid, pieces));

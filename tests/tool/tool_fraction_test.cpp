@@ -437,9 +437,11 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
     refused({"-t", "area_vector"}, "beside --target area_vector adds the inside", 1, "o.nvdb");
     refused({"-t", "area_vector"}, "slices hold one target, which is occupancy or fraction", 1, "{z}.png");
     refused({"-t", "area_vector", "--backend", "cuda"}, "--target area_vector is drawn on the CPU alone", 5);
-    refused({"-t", "aperture_x,fraction"}, "--target aperture_x is the only target of a run");
-    refused({"-t", "aperture_y", "--solid", "nonzero"}, "it holds voxels; .npy, .npz and .zarr take the faces of", 1,
-            "o.vti");
+    for (const char* const output : {"o.pvti", "o.png", "o.html", "o.nvdb", "o.vtu"})
+        refused(
+            {"-t", "fraction,aperture_y", "--solid", "nonzero"},
+            "it holds voxels; the faces of --target aperture_y go into .npy, .npz, .vti, .nrrd, .nii, .nii.gz, .zarr",
+            1, output);
     refused({"-t", "centroid"}, "beside --target centroid adds the inside", 1, "o.nvdb");
     refused({"-t", "centroid", "--backend", "cuda"}, "--target centroid is drawn on the CPU alone", 5);
     refused({"-t", "fraction", "--backend", "cuda"}, "on the CPU alone", 5);

@@ -72,6 +72,7 @@ volume padded(volume inner, int padding) {
         }
         from.data = channel_bytes(); // = {} would keep the memory
     }
+    for (volume& faces : inner.faces) outer.faces.push_back(padded(std::move(faces), padding));
     return outer;
 }
 

@@ -87,11 +87,16 @@ public:
     // some layers, and one finishes it.
     [[nodiscard]] volume unset_volume() const {
         volume result = volume_of(request_.grid);
-        if (const int axis = axis_of_faces(request_.targets.empty() ? target::occupancy : request_.targets.front());
-            axis >= 0)
-            ++result.extent[static_cast<std::size_t>(axis)]; // which is the only target
-        for (const target wanted : request_.targets)
-            result.add_unset(std::string(info_of(wanted).name), info_of(wanted).type, info_of(wanted).components);
+        for (const target wanted : request_.targets) {
+            const target_info& info = info_of(wanted);
+            volume* holder = &result;
+            if (const int axis = axis_of_faces(wanted); axis >= 0) {
+                holder = &result.faces.emplace_back(volume_of(request_.grid));
+                center_on_faces(*holder, request_.grid, axis);
+                ++holder->extent[static_cast<std::size_t>(axis)];
+            }
+            holder->add_unset(std::string(info.name), info.type, info.components);
+        }
         // Channels that nobody asked for come last.
         if (keeps_bits_ && result.find(bits_name_) == nullptr) result.add_unset(bits_name_, scalar::bit);
         return result;
@@ -136,8 +141,7 @@ public:
         }
         if constexpr (memory_access<Backend>::on_host)
             if (request_.wants_cells()) draw_cells(result);
-        result.channels.erase(result.channels.begin() + static_cast<std::ptrdiff_t>(request_.targets.size()),
-                              result.channels.end());
+        result.channels.resize(request_.targets.size() - result.faces.size());
         return result;
     }
 

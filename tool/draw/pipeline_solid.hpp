@@ -247,9 +247,12 @@ void pipeline<Backend>::draw_cells(volume& result) {
     // A channel of zeros, for most voxels get no fragment; null where nobody wants it.
     const auto zeros = [&](target id) -> float* {
         if (!wants(id)) return nullptr;
-        channel& c = *result.find(info_of(id).name);
+        volume* holder = &result;
+        for (volume& faces : result.faces)
+            if (faces.find(info_of(id).name) != nullptr) holder = &faces;
+        channel& c = *holder->find(info_of(id).name);
         std::fill(c.data.begin(), c.data.end(), std::byte{0});
-        return channel_at<float>(result, info_of(id).name, 0);
+        return channel_at<float>(*holder, info_of(id).name, 0);
     };
     measured_fraction shader;
     shader.extent = extent;

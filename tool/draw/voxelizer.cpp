@@ -232,6 +232,10 @@ volume with_ring(volume inside, const voxelize_request& request) {
     volume result = padded(std::move(inside), request.padding);
     for (std::size_t axis = 0; axis < 3; ++axis) // without the rounding of a way there and back
         result.origin[axis] = request.grid.part_origin()[static_cast<glm::length_t>(axis)];
+    for (volume& faces : result.faces) {
+        faces.origin = result.origin;
+        center_on_faces(faces, request.grid, axis_of_faces(*target_named(faces.channels.front().name)));
+    }
     return result;
 }
 

@@ -98,6 +98,12 @@ struct voxelize_request {
     return made;
 }
 
+// Puts a volume of the grid's faces across the axis into their place: the middle of its first voxel is that of the
+// first face.
+inline void center_on_faces(volume& faces, const voxelpipe::grid& grid, int axis) {
+    faces.origin[static_cast<std::size_t>(axis)] = grid.part_origin()[axis] - grid.voxel_size[axis] / 2;
+}
+
 // What was found when fractions were drawn.
 struct fraction_counts {
     double volume = 0;            // sum of the fractions of all voxels, before they are clamped

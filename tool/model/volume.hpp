@@ -104,6 +104,19 @@ struct volume {
     std::array<double, 3> voxel_size{1, 1, 1};   // world units, per axis, > 0
     std::vector<channel> channels;
     std::optional<distance_field> distances; // of a volume with the channel "distance"
+    // What lies on the faces between voxels, of which a grid has one more along an axis than voxels: a volume of one
+    // channel for each such channel, whose voxels are centred on the faces. They have no faces of their own.
+    std::vector<volume> faces;
+
+    // Calls use(v, c) for every channel, with the volume whose extent it has: those of this volume, then those of
+    // faces.
+    template <class Use>
+    void for_each_channel(const Use& use) const {
+        for (const channel& c : channels) use(*this, c);
+        for (const volume& f : faces)
+            for (const channel& c : f.channels) use(f, c);
+    }
+    [[nodiscard]] std::size_t num_channels() const { return channels.size() + faces.size(); }
 
     [[nodiscard]] std::int64_t num_voxels() const { return extent[0] * extent[1] * extent[2]; }
 
@@ -215,6 +228,11 @@ struct volume {
                 throw std::invalid_argument("channel '" + c.name + "' has an impossible number of components");
             if (!c.read && c.data.size() != num_bytes(c.type, c.components))
                 throw std::invalid_argument("channel '" + c.name + "' does not hold one value per voxel");
+        }
+        for (const volume& f : faces) {
+            if (f.channels.size() != 1 || !f.faces.empty())
+                throw std::invalid_argument("faces of a volume hold one channel each");
+            f.check();
         }
     }
 };

@@ -23,7 +23,13 @@ written_names names_of_output(const command_line& options, const voxelize_reques
     for (std::size_t a = 0; a < 3; ++a) shape.extent[a] = request.grid.extent[static_cast<int>(a)];
     for (std::size_t t = 0; t < count; ++t) {
         const target_info& info = info_of(request.targets[t]);
-        shape.channels.push_back({std::string(info.name), info.type, info.components, {}});
+        volume* holder = &shape;
+        if (const int axis = axis_of_faces(info.id); axis >= 0) {
+            holder = &shape.faces.emplace_back();
+            holder->extent = shape.extent;
+            ++holder->extent[static_cast<std::size_t>(axis)];
+        }
+        holder->channels.push_back({std::string(info.name), info.type, info.components, {}});
     }
     return names_of(shape, output, options.write, held);
 }

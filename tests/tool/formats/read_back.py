@@ -1141,6 +1141,39 @@ def check_html(case, files):
             same(values[name], want[place] if kept else want[place].astype(np.float32), f"{files[0].name}: {name}")
 
 
+def faces_of(case, name):
+    """The case of the faces across an axis, which are centred in voxels of an image of their own."""
+    axis = "xyz".index(name[-1])
+    extent, origin = list(case["extent"]), list(case["origin"])
+    extent[axis] += 1
+    origin[axis] -= case["voxel_size"][axis] / 2
+    return {**case, "extent": extent, "origin": origin, "channels": [[name, "f32", 1]], "faces": []}
+
+
+def check_with_faces(kind, case, files):
+    """.npz and .zarr hold all arrays; of others each array of faces is a file, the last ones."""
+    import numpy as np
+    import zarr
+
+    of_faces = [faces_of(case, name) for name in case["faces"]]
+    voxels = {**case, "faces": []}
+    if kind in ("npz", "zarr"):
+        assert len(files) == 1
+        want = {channel[0]: expected(voxels, n) for n, channel in enumerate(case["channels"])}
+        want.update({name: expected(each, 0) for name, each in zip(case["faces"], of_faces)})
+        found = np.load(files[0]) if kind == "npz" else zarr.open_group(files[0], mode="r")
+        names = found.files if kind == "npz" else sorted(found.array_keys())
+        assert names == (list(want) if kind == "npz" else sorted(want)), names
+        for name in names:
+            same(found[name][...].astype(want[name].dtype), want[name], f"{files[0].name}: {name}")
+        return
+    check = globals()["check_" + kind]
+    if case["channels"]:
+        check(voxels, files[: -len(of_faces)])
+    for each, file in zip(of_faces, files[-len(of_faces) :]):
+        check(each, [file])
+
+
 def main():
     if sys.argv[1:] == ["--have-modules"]:
         return 0 if have_modules() else 1
@@ -1156,7 +1189,8 @@ def main():
             continue
         checked += 1
         try:
-            globals()["check_" + kind](case, [folder / name for name in files])
+            paths = [folder / name for name in files]
+            check_with_faces(kind, case, paths) if case["faces"] else globals()["check_" + kind](case, paths)
             print(f"{case['name']}: as expected")
         except Exception as problem:  # whatever a reader throws is a failure of this case
             failures += 1

@@ -96,6 +96,18 @@ void fill_shares(volume& v) {
     store(c.data.data(), std::numeric_limits<float>::quiet_NaN());
 }
 
+// The faces across an axis, with the channel aperture_x, aperture_y or aperture_z.
+volume faces_of(const volume& v, std::size_t axis) {
+    volume faces = v;
+    faces.channels.clear();
+    faces.faces.clear();
+    ++faces.extent[axis];
+    faces.origin[axis] -= faces.voxel_size[axis] / 2;
+    faces.add(std::string("aperture_") + "xyz"[axis], scalar::f32);
+    fill(faces, 0);
+    return faces;
+}
+
 std::vector<sample_case> make_cases() {
     const std::vector<std::string> any{".npy", ".npz", ".vti", ".pvti", ".nrrd", ".nii", ".nii.gz", ".zarr"};
     const std::vector<std::string> solid{".npy",   ".npz",       ".vti",    ".nrrd", ".zarr", ".vox",
@@ -134,6 +146,17 @@ std::vector<sample_case> make_cases() {
     sample_case& listed = add("listed", {37, 23, 11}, 2, true, false, {".schem", ".litematic"});
     listed.options.blocks = many_blocks();
     add_materials(listed.v);
+    // Faces between voxels, beside voxels and alone.
+    sample_case& faces =
+        add("faces", {13, 7, 5}, 5, true, false, {".vti", ".npy", ".npz", ".nrrd", ".nii", ".nii.gz", ".zarr"});
+    faces.v.voxel_size = {0.1, 0.25, 3};
+    for (std::size_t axis = 0; axis < 3; ++axis) faces.v.faces.push_back(faces_of(faces.v, axis));
+    cases.push_back(cases.back());
+    cases.back().name = "only_faces";
+    cases.back().v.channels.clear();
+    cases.push_back(cases.back());
+    cases.back().name = "one_face";
+    cases.back().v.faces.resize(1);
     // Hexahedra: of five materials and of voxels without, by fractions, and with numbers of 64 bits.
     const std::vector<std::string> hexahedra{".vtu", ".inp", ".msh"};
     add_materials(add("materials", {70, 13, 11}, 2, true, false, hexahedra).v);
@@ -204,6 +227,11 @@ std::string describe(const sample_case& c, const std::map<std::string, std::vect
         if (n != 0) out += ", ";
         out.append("[\"").append(ch.name).append("\", \"").append(name_of(ch.type));
         out.append("\", ").append(std::to_string(ch.components)).append("]");
+    }
+    out += "],\n   \"faces\": [";
+    for (const volume& f : c.v.faces) {
+        if (&f != &c.v.faces.front()) out += ", ";
+        out.append("\"").append(f.channels.front().name).append("\"");
     }
     out += "],\n   \"threshold\": " + list_of(std::array{c.options.threshold}) + ", \"listed\": ";
     out += c.options.blocks ? "true" : "false";

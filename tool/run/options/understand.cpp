@@ -494,14 +494,14 @@ void understand_fractions(command_line& options, const raw_options& raw) {
     if (options.write.levels) throw usage_error("--levels" + together + "cut cells have no mip levels");
     for (const target id : request.targets) {
         if (axis_of_faces(id) < 0) continue;
-        const std::string faces = "--target " + std::string(info_of(id).name);
-        if (request.targets.size() != 1)
-            throw usage_error(faces + " is the only target of a run: a grid has more faces than voxels");
         for (const std::filesystem::path& output : options.outputs)
-            if (const std::string_view of = find_format(output)->extension;
-                of != ".npy" && of != ".npz" && of != ".zarr")
-                throw usage_error('"' + output.string() +
-                                  "\": it holds voxels; .npy, .npz and .zarr take the faces of " + faces);
+            if (!find_format(output)->has_faces) {
+                std::string others;
+                for (const format& each : formats())
+                    if (each.has_faces) others += (others.empty() ? "" : ", ") + std::string(each.extension);
+                throw usage_error('"' + output.string() + "\": it holds voxels; the faces of --target " +
+                                  std::string(info_of(id).name) + " go into " + others);
+            }
     }
     for (const std::filesystem::path& output : options.outputs) {
         const format& f = *find_format(output);

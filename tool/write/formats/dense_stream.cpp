@@ -68,6 +68,12 @@ std::uint64_t streamed_bytes(const volume& v, const channel& c, half_floats halv
            static_cast<std::uint64_t>(c.components);
 }
 
+std::uint64_t streamed_bytes(const volume& v, half_floats halves) {
+    std::uint64_t total = 0;
+    v.for_each_channel([&](const volume& of, const channel& c) { total += streamed_bytes(of, c, halves); });
+    return total;
+}
+
 std::span<const std::byte> streamed_piece(const volume& v, const channel& c, half_floats halves, std::uint64_t begin,
                                           std::size_t size, std::vector<std::byte>& room) {
     if (c.read) { // from the value that begins at or before `begin`

@@ -29,6 +29,8 @@ using byte_sink = std::function<void(std::span<const std::byte>)>;
 
 // Bytes that the whole stream has.
 [[nodiscard]] std::uint64_t streamed_bytes(const volume& v, const channel& c, half_floats halves);
+// Bytes that the streams of all channels have, those of faces included.
+[[nodiscard]] std::uint64_t streamed_bytes(const volume& v, half_floats halves);
 
 // Bytes [begin, begin + size) of the stream, which must be in it. They lie in the channel itself where it is streamed
 // as it is, otherwise in `room`, which is resized to hold them. Several threads may read one channel.

@@ -44,25 +44,31 @@ struct writer {
     written_names (*names)(const volume&, const std::filesystem::path&, const write_options&, held_as) = nullptr;
 };
 
+// A format of arrays, those of faces among them.
+constexpr format of_arrays(std::string_view extension, std::string_view description, bool format::*has = nullptr) {
+    format arrays{extension, description, false, true, false, false};
+    arrays.has_faces = true;
+    if (has != nullptr) arrays.*has = true;
+    return arrays;
+}
+
 constexpr auto all_formats = std::to_array<format>({
-    {".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several", false, true, false, false},
-    {".npz", "NumPy archive with one array for each channel", false, true, false, false},
+    of_arrays(".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several"),
+    of_arrays(".npz", "NumPy archive with one array for each channel"),
     {".vox", "MagicaVoxel model, split above 256 voxels, 255 colours", true, false, true, true},
     {".schem", "Minecraft schematic (Sponge 2, WorldEdit) of concrete, wool, terracotta, or see --blocks", true, false,
      true, true, false, false, false, true},
     {".litematic", "the same blocks for Litematica", true, false, true, true, false, false, false, true},
     {".binvox", "binvox occupancy, padded to a cube", true, false, false, true},
-    {".vti", "VTK image data for ParaView, all channels as cell data", false, true, false, false},
+    of_arrays(".vti", "VTK image data for ParaView, all channels as cell data"),
     {".pvti", "the same in pieces of some layers each, OUT.1.vti, ...; see --pieces", false, true, false, false, false,
      false, true},
-    {".nrrd", "NRRD for 3D Slicer and teem; OUT.CHANNEL.nrrd for several; see --space", false, true, false, false,
-     false, false, false, false, false, false, false, true},
-    {".nii", "NIfTI-1 for nibabel, FSL and 3D Slicer; OUT.CHANNEL.nii for several; see --space", false, true, false,
-     false, false, false, false, false, false, false, false, true},
-    {".nii.gz", "the same, compressed", false, true, false, false, false, false, false, false, false, false, false,
-     true},
-    {".zarr", "Zarr 3 group with a compressed array for each channel, in shards of 256^3; see --levels", false, true,
-     false, false, false, true},
+    of_arrays(".nrrd", "NRRD for 3D Slicer and teem; OUT.CHANNEL.nrrd for several; see --space", &format::has_space),
+    of_arrays(".nii", "NIfTI-1 for nibabel, FSL and 3D Slicer; OUT.CHANNEL.nii for several; see --space",
+              &format::has_space),
+    of_arrays(".nii.gz", "the same, compressed", &format::has_space),
+    of_arrays(".zarr", "Zarr 3 group with a compressed array for each channel, in shards of 256^3; see --levels",
+              &format::has_levels),
     {".glb", "glTF mesh of the voxels' outer sides, with colours; see --merge", true, false, true, false},
     {".obj", "the same as a Wavefront OBJ of quads, colours at the vertices", true, false, true, false},
     {".ply", "the same as a PLY of quads; with --points the centres of the voxels", true, false, true, false},
@@ -93,7 +99,7 @@ constexpr auto all_writers = std::to_array<writer>({
     {nullptr, write_schem},
     {nullptr, write_litematic},
     {nullptr, write_binvox},
-    {write_vti},
+    {write_vti, nullptr, vti_names},
     {write_pvti, nullptr, pvti_names},
     {write_nrrd, nullptr, channel_names},
     {write_nii, nullptr, channel_names},
@@ -186,7 +192,9 @@ std::vector<std::filesystem::path> write(const volume& v, const std::filesystem:
                                          const write_options& options) {
     const format& f = known_format(path);
     v.check();
-    if (v.channels.empty()) throw write_error(path, "there is no channel to write");
+    if (v.num_channels() == 0) throw write_error(path, "there is no channel to write");
+    if (!v.faces.empty() && !f.has_faces)
+        throw write_error(path, std::string(f.extension) + " holds voxels, but no faces between them");
     const bool is_band = v.distances && f.only_sparse; // the band stands for it
     const bool has_threshold = f.has_threshold && options.threshold > 0;
     if (f.needs_occupancy && !is_band && !has_threshold && v.occupancy() == nullptr)

@@ -74,6 +74,7 @@ struct format {
     bool has_materials = false;   // holds the numbers of materials, whether it holds other channels or not
     bool has_layers = false;      // a file for each layer of one target: obeys write_options::slice_bits
     bool has_space = false;       // obeys write_options::space
+    bool has_faces = false;       // holds volume::faces
 };
 
 // True if voxels of this size are cubes, but for what fitting a grid loses by rounding.

@@ -45,13 +45,14 @@ std::string npy_header(scalar type, const std::string& shape) {
 }
 
 std::filesystem::path channel_path(const std::filesystem::path& path, const volume& v, const channel& c) {
-    if (v.channels.size() < 2) return path;
+    if (v.num_channels() < 2) return path;
     return with_word(path, c.name);
 }
 
 written_names channel_names(const volume& shape, const std::filesystem::path& path, const write_options&, held_as) {
     written_names names;
-    for (const channel& c : shape.channels) names.files.push_back(channel_path(path, shape, c));
+    shape.for_each_channel(
+        [&](const volume&, const channel& c) { names.files.push_back(channel_path(path, shape, c)); });
     return names;
 }
 
@@ -70,19 +71,17 @@ written_names npy_names(const volume& shape, const std::filesystem::path& path, 
 
 std::vector<std::filesystem::path> write_npy(const volume& v, const std::filesystem::path& path,
                                              const write_options& options) {
-    std::uint64_t total = 0;
-    for (const channel& c : v.channels) total += streamed_bytes(v, c, half_floats::keep);
-    progress_meter meter(options.progress, total);
+    progress_meter meter(options.progress, streamed_bytes(v, half_floats::keep));
     std::vector<std::unique_ptr<output_file>> files;
-    for (const channel& c : v.channels) {
+    v.for_each_channel([&](const volume& of, const channel& c) {
         files.push_back(std::make_unique<output_file>(channel_path(path, v, c)));
         output_file& out = *files.back();
-        out.write(npy_header(v, c));
-        stream_values(v, c, half_floats::keep, [&](std::span<const std::byte> piece) {
+        out.write(npy_header(of, c));
+        stream_values(of, c, half_floats::keep, [&](std::span<const std::byte> piece) {
             out.write(piece);
             meter.advance(piece.size());
         });
-    }
+    });
     return commit_all(files);
 }
 

@@ -16,20 +16,18 @@ namespace voxelize {
 
 std::vector<std::filesystem::path> write_npz(const volume& v, const std::filesystem::path& path,
                                              const write_options& options) {
-    std::uint64_t total = 0;
-    for (const channel& c : v.channels) total += streamed_bytes(v, c, half_floats::keep);
-    progress_meter meter(options.progress, total);
+    progress_meter meter(options.progress, streamed_bytes(v, half_floats::keep));
 
     output_file out(path);
     zip_archive archive(out, options.compression);
-    for (const channel& c : v.channels) {
-        const std::string header = npy_header(v, c);
+    v.for_each_channel([&](const volume& of, const channel& c) {
+        const std::string header = npy_header(of, c);
         if (options.compression > 0) {
             // Compressed here, on all threads; minizip writes what surrounds it.
             archive.add_compressed(c.name + ".npy", [&](const entry_sink& add) {
                 piece_compressor compressor(piece_compressor::form::stream_part, options.compression);
                 running_crc whole;
-                compress_channel(v, c, half_floats::keep, std::as_bytes(std::span{header}), compressed_piece_bytes,
+                compress_channel(of, c, half_floats::keep, std::as_bytes(std::span{header}), compressed_piece_bytes,
                                  options.threads, compressor, [&](const compressed_piece& piece) {
                                      add(piece.bytes);
                                      whole.add(piece);
@@ -41,13 +39,13 @@ std::vector<std::filesystem::path> write_npz(const volume& v, const std::filesys
         } else {
             archive.add(c.name + ".npy", [&](const entry_sink& add) {
                 add(std::as_bytes(std::span{header}));
-                stream_values(v, c, half_floats::keep, [&](std::span<const std::byte> piece) {
+                stream_values(of, c, half_floats::keep, [&](std::span<const std::byte> piece) {
                     add(piece);
                     meter.advance(piece.size());
                 });
             });
         }
-    }
+    });
     archive.finish();
     out.commit();
     return {path};

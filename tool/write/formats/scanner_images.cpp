@@ -93,12 +93,6 @@ void write_plain(output_file& out, const volume& v, const channel& c, progress_m
     });
 }
 
-std::uint64_t bytes_of_image(const volume& v) {
-    std::uint64_t total = 0;
-    for (const channel& c : v.channels) total += streamed_bytes(v, c, half_floats::widen);
-    return total;
-}
-
 // ---- NIfTI
 
 // NIfTI's number of a type of voxels.
@@ -183,49 +177,52 @@ channel plane_of(const volume& v, const channel& c, std::size_t component) {
 
 std::vector<std::filesystem::path> write_nii(const volume& v, const std::filesystem::path& path,
                                              const write_options& options) {
-    const std::int64_t longest = *std::max_element(v.extent.begin(), v.extent.end());
-    if (longest > INT16_MAX)
-        throw write_error(path, "too large for .nii, which ends at 32767 voxels along an axis: this grid has " +
-                                    std::to_string(longest) + "; use .nrrd or .zarr");
-    const double moved = std::max({moved_by_floats(v, 0), moved_by_floats(v, 1), moved_by_floats(v, 2)});
+    double moved = 0;
+    v.for_each_channel([&](const volume& of, const channel&) {
+        const std::int64_t longest = *std::max_element(of.extent.begin(), of.extent.end());
+        if (longest > INT16_MAX)
+            throw write_error(path, "too large for .nii, which ends at 32767 voxels along an axis: this grid has " +
+                                        std::to_string(longest) + "; use .nrrd or .zarr");
+        for (std::size_t a = 0; a < 3; ++a) moved = std::max(moved, moved_by_floats(of, a));
+    });
     if (constexpr double most = 0x1p-10; moved > most && options.warn)
         options.warn("\"" + path.string() + "\": its header has floats, which move voxels by up to " +
                      decimal(moved, 3) + " of their size; .nrrd has doubles");
-    progress_meter meter(options.progress, bytes_of_image(v));
+    progress_meter meter(options.progress, streamed_bytes(v, half_floats::widen));
     const bool compress = lower_extension(path) == ".nii.gz";
     std::vector<std::unique_ptr<output_file>> files;
-    for (const channel& c : v.channels) {
+    v.for_each_channel([&](const volume& of, const channel& c) {
         files.push_back(std::make_unique<output_file>(channel_path(path, v, c)));
         output_file& out = *files.back();
         std::vector<channel> planes;
         if (has_planes(c))
-            for (int m = 0; m < c.components; ++m) planes.push_back(plane_of(v, c, static_cast<std::size_t>(m)));
+            for (int m = 0; m < c.components; ++m) planes.push_back(plane_of(of, c, static_cast<std::size_t>(m)));
         const std::span<const channel> parts = planes.empty() ? std::span{&c, 1} : std::span<const channel>{planes};
-        const std::vector<std::byte> header = nifti_header(v, c, options.space);
+        const std::vector<std::byte> header = nifti_header(of, c, options.space);
         if (compress) {
-            write_gzip_image(out, header, v, parts, options, meter);
+            write_gzip_image(out, header, of, parts, options, meter);
         } else {
             out.write(header);
-            for (const channel& part : parts) write_plain(out, v, part, meter);
+            for (const channel& part : parts) write_plain(out, of, part, meter);
         }
-    }
+    });
     return commit_all(files);
 }
 
 std::vector<std::filesystem::path> write_nrrd(const volume& v, const std::filesystem::path& path,
                                               const write_options& options) {
-    progress_meter meter(options.progress, bytes_of_image(v));
+    progress_meter meter(options.progress, streamed_bytes(v, half_floats::widen));
     const bool compress = options.compression > 0;
     std::vector<std::unique_ptr<output_file>> files;
-    for (const channel& c : v.channels) {
+    v.for_each_channel([&](const volume& of, const channel& c) {
         files.push_back(std::make_unique<output_file>(channel_path(path, v, c)));
         output_file& out = *files.back();
-        out.write(header_of(v, c, options.space, compress));
+        out.write(header_of(of, c, options.space, compress));
         if (compress)
-            write_gzip_image(out, {}, v, {&c, 1}, options, meter);
+            write_gzip_image(out, {}, of, {&c, 1}, options, meter);
         else
-            write_plain(out, v, c, meter);
-    }
+            write_plain(out, of, c, meter);
+    });
     return commit_all(files);
 }
 

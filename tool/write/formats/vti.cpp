@@ -131,6 +131,17 @@ std::uint64_t bytes_of(const volume& v) {
     return total;
 }
 
+// The images of a .vti with their files: that of the voxels has the path, those of faces have their channels' names in
+// it, but for a single image.
+std::vector<std::pair<const volume*, std::filesystem::path>> images_of(const volume& v,
+                                                                       const std::filesystem::path& path) {
+    std::vector<std::pair<const volume*, std::filesystem::path>> images;
+    if (!v.channels.empty()) images.emplace_back(&v, path);
+    for (const volume& f : v.faces)
+        images.emplace_back(&f, v.num_channels() == 1 ? path : with_word(path, f.channels.front().name));
+    return images;
+}
+
 // The layers [first, last) of the grid, whose channels read those of `v`.
 volume layers_of(const volume& v, std::int64_t first, std::int64_t last) {
     volume part; // of v's channels none is copied
@@ -193,13 +204,21 @@ void remove_old_pieces(const std::filesystem::path& path, std::int64_t pieces, s
 
 } // namespace
 
+written_names vti_names(const volume& shape, const std::filesystem::path& path, const write_options&, held_as) {
+    written_names names;
+    for (const auto& [image, file] : images_of(shape, path)) names.files.push_back(file);
+    return names;
+}
+
 std::vector<std::filesystem::path> write_vti(const volume& v, const std::filesystem::path& path,
                                              const write_options& options) {
-    progress_meter meter(options.progress, bytes_of(v));
-    output_file out(path);
-    write_image(out, v, 0, options, meter);
-    out.commit();
-    return {path};
+    progress_meter meter(options.progress, streamed_bytes(v, half_floats::widen));
+    std::vector<std::unique_ptr<output_file>> files;
+    for (const auto& [image, file] : images_of(v, path)) {
+        files.push_back(std::make_unique<output_file>(file));
+        write_image(*files.back(), *image, 0, options, meter);
+    }
+    return commit_all(files);
 }
 
 std::int64_t num_pvti_pieces(const volume& v, const write_options& options) {

@@ -15,8 +15,11 @@
 
 namespace voxelize {
 
+// An image of the voxels, and one for each channel of faces, OUT.CHANNEL.vti, unless there is no other channel.
 std::vector<std::filesystem::path> write_vti(const volume& v, const std::filesystem::path& path,
                                              const write_options& options);
+[[nodiscard]] written_names vti_names(const volume& shape, const std::filesystem::path& path,
+                                      const write_options& options, held_as held);
 
 // OUT.pvti, and its pieces OUT.1.vti, OUT.2.vti, ... beside it, which come first in the result: options.pieces, or as
 // many as options.piece_bytes asks for, 512 at most. The .pvti gets its name last.

@@ -250,19 +250,19 @@ std::vector<fs::path> write_zarr(const volume& v, const fs::path& path, const wr
     try {
         std::vector<std::unique_ptr<channel_writer>> arrays;
         std::uint64_t steps = 0;
-        for (const channel& c : v.channels) {
+        v.for_each_channel([&](const volume& of, const channel& c) {
             const fs::path array_folder = array_of(folder.path(), c, options);
             fs::create_directories(array_folder);
-            arrays.push_back(std::make_unique<channel_writer>(v, c, array_folder, options));
+            arrays.push_back(std::make_unique<channel_writer>(of, c, array_folder, options));
             steps += static_cast<std::uint64_t>(arrays.back()->chunks_of(arrays.back()->num_shards()));
-            if (options.levels) steps += num_level_blocks(v);
-        }
+            if (options.levels) steps += num_level_blocks(of);
+        });
         progress_meter meter(options.progress, steps);
         const auto advance = [&] { meter.advance(1); };
         for (std::size_t n = 0; n < arrays.size(); ++n) {
             arrays[n]->write(0, arrays[n]->num_shards(), thread_count(options.threads), advance);
             arrays[n]->describe();
-            if (!options.levels) continue;
+            if (!options.levels || n >= v.channels.size()) continue; // faces have none
             const channel& c = v.channels[n];
             write_zarr_levels(v, c, folder.path() / c.name, options, advance);
             write_description(folder.path() / c.name, multiscale_description(v, c));
