@@ -252,6 +252,59 @@ TEST(Fraction, OverlapsAddUpAndClampKeepsOne) {
     expect_same(expected, read_npy(folder / "clamped.npy"));
 }
 
+std::size_t cells_of(const std::string& vtu) {
+    const std::string before = "NumberOfCells=\"";
+    const std::size_t at = vtu.find(before);
+    return at == std::string::npos ? SIZE_MAX : std::stoul(vtu.substr(at + before.size()));
+}
+
+// 1 minus the values of the inside, rounded once, in every voxel and on every face; other targets are as without it.
+TEST(Fraction, OutsideIsOneMinusTheInside) {
+    const scratch_folder folder;
+    builder file;
+    add(file, tilted);
+    add(file, box({-1, -1, -1}, {1, 3, 1})); // with overlaps
+    const std::string names = "fraction,area_vector,aperture_x,aperture_y,aperture_z,occupancy";
+    for (const std::vector<std::string>& more :
+         std::vector<std::vector<std::string>>{{}, {"--clamp"}, {"--padding", "2"}}) {
+        const auto voxelize = [&](const std::string& output, std::vector<std::string> how) {
+            file.write_glb(folder / "m.glb");
+            how.insert(how.begin(), {folder / "m.glb", "-o", folder / output, "-t", names, "-r", "16", "--solid",
+                                     "nonzero", "--stats", "json"});
+            how.insert(how.end(), more.begin(), more.end());
+            const outcome result = run(folder, how);
+            EXPECT_EQ(0, result.code) << result.err;
+            return json::parse(result.out)["fractions"];
+        };
+        EXPECT_EQ(voxelize("i.npy", {}), voxelize("o.npy", {"--outside", "-j", "3"}));
+        for (const std::string name : {"fraction", "aperture_x", "aperture_y", "aperture_z"}) {
+            const array inside = read_npy(folder / ("i." + name + ".npy")),
+                        outside = read_npy(folder / ("o." + name + ".npy"));
+            ASSERT_EQ(inside.shape, outside.shape);
+            std::size_t cut = 0, whole = 0;
+            for (std::size_t i = 0; i < inside.voxels(); ++i) {
+                const auto share = inside.at<float>(i);
+                ASSERT_EQ(1.0F - share, outside.at<float>(i)) << name << ' ' << i;
+                cut += share != 0 && share != 1 ? 1 : 0;
+                whole += share == 0 ? 1 : 0;
+            }
+            EXPECT_LT(100U, cut);
+            EXPECT_LT(100U, whole);
+        }
+        for (const std::string name : {"area_vector", "occupancy"})
+            EXPECT_TRUE(read_file(folder / ("i." + name + ".npy")) == read_file(folder / ("o." + name + ".npy")))
+                << name;
+    }
+    // Hexahedra are those of the fluid.
+    const std::vector<float> fractions = library_fractions({tilted}, grid_of_16());
+    builder alone;
+    add(alone, tilted);
+    const outcome fluid = draw(folder, alone, "o.vtu", {"-t", "fraction", "--outside", "--threshold", "0.75"});
+    ASSERT_EQ(0, fluid.code) << fluid.err;
+    EXPECT_EQ(std::count_if(fractions.begin(), fractions.end(), [](float f) { return 1 - f >= 0.75F; }),
+              static_cast<std::ptrdiff_t>(cells_of(read_file(folder / "o.vtu"))));
+}
+
 // The lid on a box without a side is the side: the closed box's values, without a warning, beside a solid too.
 TEST(Fraction, HolesAreClosed) {
     const scratch_folder folder;
@@ -335,12 +388,6 @@ TEST(Fraction, EveryFormatOfValuesHoldsIt) {
         }
         EXPECT_EQ(std::vector<std::string>{"fraction"}, fog);
     }
-}
-
-std::size_t cells_of(const std::string& vtu) {
-    const std::string before = "NumberOfCells=\"";
-    const std::size_t at = vtu.find(before);
-    return at == std::string::npos ? SIZE_MAX : std::stoul(vtu.substr(at + before.size()));
 }
 
 TEST(Fraction, ThresholdChoosesTheHexahedra) {
@@ -431,6 +478,16 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
     for (const std::string bad : {"0", "-1", "1.001", "nan"})
         refused({"-t", "fraction", "--threshold", bad}, "--threshold takes a fraction above 0 and up to 1", 1, "o.msh");
     refused({"--clamp"}, "--clamp goes with --target fraction");
+    const std::string needs = "--outside goes with --target fraction, aperture_x, aperture_y and aperture_z";
+    refused({"--outside"}, needs);
+    refused({"--outside", "--solid", "nonzero", "-t", "occupancy,color"}, needs);
+    refused({"--outside", "-t", "area,area_vector"}, needs);
+    refused({"--outside", "--distance"}, needs);
+    refused({"--outside", "--remesh"}, needs, 1, "o.ply");
+    refused({"--outside", "-t", "links"}, needs, 1, "o.npz");
+    refused({"--outside", "-t", "fraction,centroid"}, "--outside and --target centroid do not go together");
+    refused({"--outside", "-t", "fraction", "--sparse"}, "--outside and --sparse do not go together");
+    refused({"--outside", "-t", "fraction", "--solid", "nonzero"}, "--outside is about all others", 1, "o.nvdb");
     refused({"-t", "area_vector", "--clamp"}, "--clamp goes with --target fraction");
     refused({"-t", "area_vector", "--sparse"}, "fraction, area and centroid alone, not area_vector");
     refused({"-t", "area_vector", "--resume"}, "--target area_vector is one piece of work");

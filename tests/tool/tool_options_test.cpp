@@ -62,6 +62,7 @@ std::set<std::string> all_options() {
             "--depth-axis AXIS",
             "--alpha RULE",
             "--clamp",
+            "--outside",
             "--neighbours 18|26",
             "--backend NAME",
             "--strategy NAME",

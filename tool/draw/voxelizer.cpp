@@ -228,6 +228,21 @@ volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats)
     return result;
 }
 
+// Makes those of the outside of fractions and apertures.
+void take_outside(volume& result, int threads) {
+    const auto turn = [threads](channel& c) {
+        auto* const values = reinterpret_cast<float*>(c.data.data());
+        const std::size_t count = c.data.size() / sizeof(float);
+        constexpr std::size_t piece = std::size_t{1} << 16;
+        parallel_for((count + piece - 1) / piece, thread_count(threads), [=](std::size_t n) {
+            const std::size_t end = std::min(count, (n + 1) * piece);
+            for (std::size_t i = n * piece; i < end; ++i) values[i] = 1.0F - values[i];
+        });
+    };
+    if (channel* const fractions = result.find(info_of(target::fraction).name); fractions != nullptr) turn(*fractions);
+    for (volume& faces : result.faces) turn(faces.channels.front());
+}
+
 volume with_ring(volume inside, const voxelize_request& request) {
     volume result = padded(std::move(inside), request.padding);
     for (std::size_t axis = 0; axis < 3; ++axis) // without the rounding of a way there and back
@@ -308,7 +323,9 @@ volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_st
                                                                 return run_on_cuda(facts, model, how, stats);
                                                             }))
                 return with_ring(std::move(*result), request);
-        return with_ring(run_on_cpu(model, inside, stats), request);
+        volume result = with_ring(run_on_cpu(model, inside, stats), request);
+        if (request.outside) take_outside(result, request.threads); // the ring, too
+        return result;
     } catch (const std::bad_alloc&) {
         throw memory_error(memory::shortage(memory::fewer_voxels_hint));
     }

@@ -54,6 +54,7 @@ struct voxelize_request {
     std::vector<target> targets{target::occupancy}; // channels of the volume, in this order, none twice
     int depth_axis = 2;                             // 0 x, 1 y, 2 z
     bool clamp = false;                             // fractions to 0..1
+    bool outside = false;                           // fractions and apertures are those of what is not inside
     int neighbours = 18;                            // links of a voxel: 18 or 26
     std::uint64_t close_holes = 0; // before cells are measured, holes of up to this number of edges; 0: no holes
     blend_alpha alpha = blend_alpha::weight;

@@ -197,6 +197,10 @@ void describe_values(CLI::App& app, command_line& options, raw_options& raw) {
         ->group("Coverage and values");
     app.add_flag("--clamp", options.voxelize.clamp, "Fractions below 0 become 0, those above 1 become 1")
         ->group("Coverage and values");
+    app.add_flag("--outside", options.voxelize.outside,
+                 "Fractions and apertures are those of the outside, 1 minus those of the inside, as flow solvers want "
+                 "them of the fluid around a body")
+        ->group("Coverage and values");
     app.add_option("--neighbours", raw.neighbours,
                    "With --target links: the links of a voxel, 18 through faces and edges or 26 with corners. Default: "
                    "18")

@@ -105,6 +105,7 @@ std::string help_footer() {
         "targets "
         "it\n"
         "  is an image of its own, OUT.aperture_x.vti.\n"
+        "  --outside takes fractions and apertures of the outside, 1 minus these: of the fluid around a body.\n"
         "  With --sparse fraction, area and centroid keep what is cut or inside alone.\n"
         "  All are drawn on the CPU. --threshold makes hexahedra of the voxels whose fraction is at least so "
         "much.\n"

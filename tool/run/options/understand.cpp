@@ -434,8 +434,30 @@ void understand_links(command_line& options, const raw_options& raw) {
 
 } // namespace
 
+namespace {
+
+// Fractions of the outside, where there are fractions or apertures and every voxel is kept.
+void check_outside(const command_line& options) {
+    const voxelize_request& request = options.voxelize;
+    if (std::none_of(request.targets.begin(), request.targets.end(),
+                     [](target id) { return id == target::fraction || axis_of_faces(id) >= 0; }))
+        throw usage_error("--outside goes with --target fraction, aperture_x, aperture_y and aperture_z");
+    if (request.wants(target::centroid))
+        throw usage_error("--outside and --target centroid do not go together: it is that of the part inside, from "
+                          "which docs/solvers.md has that of the other part");
+    if (options.storage == storage_choice::sparse)
+        throw usage_error("--outside and --sparse do not go together: sparse grids leave out what is outside");
+    for (const std::filesystem::path& output : options.outputs)
+        if (find_format(output)->only_sparse)
+            throw usage_error('"' + output.string() +
+                              "\": it holds occupied voxels alone, and --outside is about all others");
+}
+
+} // namespace
+
 void understand_fractions(command_line& options, const raw_options& raw) {
     const voxelize_request& request = options.voxelize;
+    if (request.outside) check_outside(options);
     if (!raw.close_holes.empty() && !request.solid && !request.distance && !request.remesh && !request.wants_cells())
         throw usage_error("--close-holes goes with --solid, or with --target fraction and its like");
     if (raw.neighbours && !request.wants_links()) throw usage_error("--neighbours goes with --target links");
