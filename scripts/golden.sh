@@ -130,6 +130,8 @@ tool_cases() {
         printf 'target.tool.%s model.glb out.npy -r 32 -t %s\n' "$target" "$target"
     done
     printf 'cells.tool.fraction model.glb out.npz -r 32 -t fraction,occupancy --solid nonzero\n'
+    printf 'cells.tool.faces model.glb out.vti -r 32 -t fraction,aperture_x,aperture_y,aperture_z\n'
+    printf 'cells.tool.outside model.glb out.npz -r 32 -t fraction,aperture_z --outside\n'
     for coverage in conservative thin crosshair diagonal; do
         printf 'coverage.tool.%s model.glb out.npz -r 40x28x33 --coverage %s -t occupancy,count\n' "$coverage" "$coverage"
     done
