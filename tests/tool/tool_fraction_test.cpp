@@ -502,11 +502,19 @@ TEST(Fraction, WhatDoesNotGoTogetherIsRefused) {
     refused({"-t", "centroid"}, "beside --target centroid adds the inside", 1, "o.nvdb");
     refused({"-t", "centroid", "--backend", "cuda"}, "--target centroid is drawn on the CPU alone", 5);
     refused({"-t", "fraction", "--backend", "cuda"}, "on the CPU alone", 5);
-    const outcome large =
-        run(folder, {folder / "m.glb", "-o", folder / "o.npy", "-t", "fraction", "-r", "1000", "--max-memory", "300"});
-    EXPECT_EQ(3, large.code) << large.err;
-    EXPECT_NE(std::string::npos, large.err.find("300 MiB")) << large.err;
-    EXPECT_FALSE(fs::exists(folder / "o.npy"));
+    // What slabs do not have, beyond memory.
+    const std::vector<std::vector<std::string>> whole{{"-t", "fraction,aperture_x"},
+                                                      {"-t", "fraction,area_vector"},
+                                                      {"-t", "fraction", "--dense"},
+                                                      {"-t", "fraction,occupancy", "--solid", "nonzero", "--dense"}};
+    for (std::vector<std::string> arguments : whole) {
+        arguments.insert(arguments.end(),
+                         {folder / "m.glb", "-o", folder / "o.npy", "-r", "1000", "--max-memory", "300"});
+        const outcome large = run(folder, arguments);
+        EXPECT_EQ(3, large.code) << large.err;
+        EXPECT_NE(std::string::npos, large.err.find("300 MiB")) << large.err;
+        EXPECT_FALSE(fs::exists(folder / "o.npy"));
+    }
 }
 
 // What is cut or inside, with the values of a dense run; files of all voxels are the same.

@@ -313,7 +313,8 @@ void pipeline<Backend>::note_cells(const vp::status& status, fraction_counts cou
         add_counts(status);
         stats_.slabs = 1;
     }
-    counts.volume = status.cells.volume();
+    counts.volume_low = status.cells.volume_low;
+    counts.volume_high = status.cells.volume_high;
     counts.cut_voxels = status.cells.cut_voxels;
     counts.below_zero = status.cells.below_zero;
     counts.above_one = status.cells.above_one;
@@ -322,8 +323,7 @@ void pipeline<Backend>::note_cells(const vp::status& status, fraction_counts cou
     counts.holes = status.cells.holes;
     counts.closed_holes = status.cells.cones;
     stats_.fractions = counts;
-    for (std::string& warning : fraction_warnings(counts, request_.clamp || !wants(target::fraction)))
-        stats_.warnings.push_back(std::move(warning));
+    add_fraction_warnings(request_, stats_);
     report_(1.0);
 }
 

@@ -228,21 +228,6 @@ volume run_on_cpu(scene& model, voxelize_request request, voxelize_stats& stats)
     return result;
 }
 
-// Makes those of the outside of fractions and apertures.
-void take_outside(volume& result, int threads) {
-    const auto turn = [threads](channel& c) {
-        auto* const values = reinterpret_cast<float*>(c.data.data());
-        const std::size_t count = c.data.size() / sizeof(float);
-        constexpr std::size_t piece = std::size_t{1} << 16;
-        parallel_for((count + piece - 1) / piece, thread_count(threads), [=](std::size_t n) {
-            const std::size_t end = std::min(count, (n + 1) * piece);
-            for (std::size_t i = n * piece; i < end; ++i) values[i] = 1.0F - values[i];
-        });
-    };
-    if (channel* const fractions = result.find(info_of(target::fraction).name); fractions != nullptr) turn(*fractions);
-    for (volume& faces : result.faces) turn(faces.channels.front());
-}
-
 volume with_ring(volume inside, const voxelize_request& request) {
     volume result = padded(std::move(inside), request.padding);
     for (std::size_t axis = 0; axis < 3; ++axis) // without the rounding of a way there and back
@@ -303,7 +288,24 @@ void require_cpu(const voxelize_request& request, const std::string& why, voxeli
     if (request.backend == backend_choice::automatic) stats.no_cuda = why;
 }
 
+void take_outside(volume& result, int threads) {
+    const auto turn = [threads](channel& c) {
+        auto* const values = reinterpret_cast<float*>(c.data.data());
+        const std::size_t count = c.data.size() / sizeof(float);
+        constexpr std::size_t piece = std::size_t{1} << 16;
+        parallel_for((count + piece - 1) / piece, thread_count(threads), [=](std::size_t n) {
+            const std::size_t end = std::min(count, (n + 1) * piece);
+            for (std::size_t i = n * piece; i < end; ++i) values[i] = 1.0F - values[i];
+        });
+    };
+    if (channel* const fractions = result.find(info_of(target::fraction).name); fractions != nullptr) turn(*fractions);
+    for (volume& faces : result.faces) turn(faces.channels.front());
+}
+
 volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats) {
+    if (request.wants_cells())
+        require_cpu(request, "--target " + name_of_cells(request) + " is drawn on the CPU alone", stats);
+    if (std::optional<volume> slabs = cells_in_slabs(model, request, stats)) return std::move(*slabs);
     const double need = dense_need(model, request);
     memory::expect(need);
     require_volume(request, need);
@@ -312,11 +314,7 @@ volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_st
         inside.grid = request.grid.crop(glm::ivec3(request.padding), request.grid.extent - 2 * request.padding);
         if (inside.solid) inside.solid->is_whole = true;
         const bool only_cpu = request.wants_cells() || (request.solid && request.solid->fill == solid_fill::nearest);
-        if (only_cpu)
-            require_cpu(request,
-                        (request.wants_cells() ? "--target " + name_of_cells(request) : "--fill nearest") +
-                            " is drawn on the CPU alone",
-                        stats);
+        if (only_cpu && !request.wants_cells()) require_cpu(request, "--fill nearest is drawn on the CPU alone", stats);
         if (request.backend != backend_choice::cpu && !only_cpu)
             if (std::optional<volume> result = draw_on_cuda(model, inside, false, stats,
                                                             [&](const cuda_facts& facts, const voxelize_request& how) {

@@ -54,8 +54,9 @@ struct voxelize_request {
     std::vector<target> targets{target::occupancy}; // channels of the volume, in this order, none twice
     int depth_axis = 2;                             // 0 x, 1 y, 2 z
     bool clamp = false;                             // fractions to 0..1
-    bool outside = false;                           // fractions and apertures are those of what is not inside
-    int neighbours = 18;                            // links of a voxel: 18 or 26
+    int slab_layers = 0;  // cut cells: outputs take slabs of a multiple of this number of layers; 0: they do not
+    bool outside = false; // fractions and apertures are those of what is not inside
+    int neighbours = 18;  // links of a voxel: 18 or 26
     std::uint64_t close_holes = 0; // before cells are measured, holes of up to this number of edges; 0: no holes
     blend_alpha alpha = blend_alpha::weight;
     backend_choice backend = backend_choice::automatic;
@@ -107,7 +108,9 @@ inline void center_on_faces(volume& faces, const voxelpipe::grid& grid, int axis
 
 // What was found when fractions were drawn.
 struct fraction_counts {
-    double volume = 0;            // sum of the fractions of all voxels, before they are clamped
+    // The sum of the fractions of all voxels, before they are clamped, as voxelpipe::cell_counters has it.
+    std::uint64_t volume_low = 0;
+    std::int64_t volume_high = 0;
     std::uint64_t cut_voxels = 0; // that a triangle's inside reaches
     std::uint64_t below_zero = 0; // voxels with a fraction below -2^-24
     std::uint64_t above_one = 0;  // above 1 + 2^-24
@@ -115,6 +118,14 @@ struct fraction_counts {
     std::uint64_t open_rows = 0;  // rows whose triangles do not balance
     std::uint64_t open_edges = 0; // edges of the snapped model, lids included, that no opposite edge cancels
     std::uint64_t hole_edges = 0, holes = 0, closed_holes = 0; // with close_holes
+
+    // The sum in voxels.
+    [[nodiscard]] double volume() const {
+        voxelpipe::cell_counters sum;
+        sum.volume_low = volume_low;
+        sum.volume_high = volume_high;
+        return sum.volume();
+    }
 };
 
 struct voxelize_stats {
@@ -159,12 +170,26 @@ void require_cpu(const voxelize_request& request, const std::string& why, voxeli
 // Throws memory_error, backend_error, and std::runtime_error for what the library refuses.
 [[nodiscard]] volume run_voxelizer(scene&& model, const voxelize_request& request, voxelize_stats& stats);
 
+// Makes those of the outside of the fractions and apertures of a result.
+void take_outside(volume& result, int threads);
+
+// Cut cells in slabs, where the whole result does not fit, outputs take slabs, and each layer has its values by itself
+// (fraction, area, centroid): then the channels have no data, but draw slabs as they are read and keep two. `stats` has
+// to outlive the volume, and its counts are whole once all of it has been read; add_fraction_warnings is left to do
+// then. No volume where all is drawn at once; the scene is as it was. Throws memory_error where slabs do not fit
+// either.
+[[nodiscard]] std::optional<volume> cells_in_slabs(scene& model, const voxelize_request& request,
+                                                   voxelize_stats& stats);
+
 // The reason why no voxel is covered, one line; for stats that count none. low, high: the model's bounds.
 [[nodiscard]] std::string why_empty(const voxelize_stats& stats, const voxelize_request& request, const glm::dvec3& low,
                                     const glm::dvec3& high);
 
 // Lines on fractions that are no volume inside: of an open model, and of parts that overlap or are inside out.
 [[nodiscard]] std::vector<std::string> fraction_warnings(const fraction_counts& counts, bool clamp);
+
+// Adds these lines of what was drawn.
+void add_fraction_warnings(const voxelize_request& request, voxelize_stats& stats);
 
 // One line on normals that cancel; empty where none do.
 [[nodiscard]] std::string cancelled_warning(const voxelize_stats& stats);

@@ -50,6 +50,12 @@ std::vector<std::string> fraction_warnings(const fraction_counts& counts, bool c
     return warnings;
 }
 
+void add_fraction_warnings(const voxelize_request& request, voxelize_stats& stats) {
+    if (!stats.fractions) return;
+    for (std::string& warning : fraction_warnings(*stats.fractions, request.clamp || !request.wants(target::fraction)))
+        stats.warnings.push_back(std::move(warning));
+}
+
 std::string cancelled_warning(const voxelize_stats& stats) {
     if (stats.normals_cancelled == 0) return "";
     return "the normals of " + std::to_string(stats.normals_cancelled) + " of " + std::to_string(stats.voxels) +

@@ -131,7 +131,7 @@ void print_text(std::ostream& stream, const run_report& report) {
         line("holes") << report.stats.solid->closed_holes << " of " << report.stats.solid->holes << " closed, of "
                       << report.stats.solid->hole_edges << " edges in all\n";
     if (const auto& counts = report.stats.fractions; counts)
-        line("fractions") << "volume of " << shortest(counts->volume) << " voxels, " << counts->cut_voxels << " cut, "
+        line("fractions") << "volume of " << shortest(counts->volume()) << " voxels, " << counts->cut_voxels << " cut, "
                           << counts->below_zero << " below 0, " << counts->above_one << " above 1, "
                           << counts->open_rows << " of " << counts->rows << " rows open, " << counts->open_edges
                           << " open edges\n";
@@ -212,7 +212,7 @@ void print_json(std::ostream& stream, const run_report& report) {
         if (report.stats.solid) root["remesh"]["open_rows"] = report.stats.solid->open_rows;
     }
     if (const auto& counts = report.stats.fractions; counts)
-        root["fractions"] = {{"volume", counts->volume},
+        root["fractions"] = {{"volume", counts->volume()},
                              {"cut_voxels", counts->cut_voxels},
                              {"below_zero", counts->below_zero},
                              {"above_one", counts->above_one},

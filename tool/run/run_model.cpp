@@ -107,13 +107,14 @@ std::vector<std::filesystem::path> write_output(Volume& voxels, const command_li
     return files;
 }
 
-// Layers of whose multiple the outputs take a field of distances in slabs; 0: one of them needs it whole.
+// Layers of whose multiple the outputs take a field of distances, or cut cells, in slabs; 0: one of them needs it
+// whole.
 int slab_layers_of(const command_line& options) {
     constexpr int brick = 8; // what holds the band reads a layer of bricks at a time
     int layers = 1;
     for (const std::filesystem::path& output : options.outputs) {
         const std::string extension = lower_extension(zarr_target(output));
-        const bool holds_band = extension == ".nvdb" || extension == ".vdb";
+        const bool holds_band = options.voxelize.distance && (extension == ".nvdb" || extension == ".vdb");
         if ((!is_streamed(extension) && !holds_band) || shows_level(output)) return 0;
         if (holds_band) layers = std::max(layers, brick);
         if (extension == ".zarr") layers = static_cast<int>(zarr_slab_layers); // shards are written one by one
@@ -354,6 +355,8 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
         return bytes;
     };
     if (report.request.distance) report.request.distance->slab_layers = slab_layers_of(options);
+    if (report.request.wants_cells() && options.storage != storage_choice::dense)
+        report.request.slab_layers = slab_layers_of(options);
     if (report.request.distance || report.request.remesh) {
         storage = {false, false, ""};
     } else if (!stream) {
@@ -421,7 +424,10 @@ void run(const command_line& options, clock::time_point begin, const opened_stre
     }
     bar.clear();
     if (is_late) {
-        add_distance_warnings(report.request, report.stats);
+        if (report.request.distance)
+            add_distance_warnings(report.request, report.stats);
+        else
+            add_fraction_warnings(report.request, report.stats);
         tell();
     }
     report.stats.milliseconds.emplace_back("write", milliseconds_since(start));

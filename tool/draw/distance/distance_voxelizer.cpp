@@ -174,7 +174,6 @@ std::optional<int> layers_of_slabs(const scene& model, const voxelize_request& r
     const distance_request& distance = *request.distance;
     const glm::ivec3 extent = request.grid.extent;
     const auto room = static_cast<double>(memory::room());
-    constexpr double used = 0.75; // of the room, by estimate: what slabs of less take beside is not all known
     const int step = distance.slab_layers;
     const bool sees_all = distance.is_signed && distance.sign.rule == solid_rule::exterior;
     const bool has_slabs =
@@ -195,24 +194,22 @@ std::optional<int> layers_of_slabs(const scene& model, const voxelize_request& r
         memory::require(need, what, memory::fewer_voxels_hint, need);
         return std::nullopt;
     }
-    int steps = 1; // the need grows with the layers
-    for (int more = (extent.z - 1) / step; more > 0; more /= 2)
-        while (steps + more < (extent.z + step - 1) / step && need_of((steps + more) * step) <= used * room)
-            steps += more;
-    const double need_of_slabs = need_of(steps * step);
+    const int layers = most_layers(extent.z, step, room, need_of);
+    const double need_of_slabs = need_of(layers);
     memory::expect(need_of_slabs);
-    memory::require(need_of_slabs, what + ", in slabs of " + std::to_string(steps * step) + " layers",
+    memory::require(need_of_slabs, what + ", in slabs of " + std::to_string(layers) + " layers",
                     memory::fewer_voxels_hint, need_of_slabs);
-    return steps * step;
+    return layers;
 }
 
 } // namespace
 
-volume make_late_field(const voxelize_request& request, std::vector<int> ends,
-                       const std::function<volume(std::size_t)>& draw, voxelize_stats& stats) {
+volume make_late_volume(const voxelize_request& request, std::vector<int> ends,
+                        const std::function<volume(std::size_t)>& draw, voxelize_stats& stats) {
     volume field = volume_of(request.grid);
-    field.distances = distance_field{vp::core::band_distance(options_of(*request.distance).band, request.grid),
-                                     request.distance->is_signed};
+    if (request.distance)
+        field.distances = distance_field{vp::core::band_distance(options_of(*request.distance).band, request.grid),
+                                         request.distance->is_signed};
     const auto drawn = std::make_shared<late_field>(request.grid.extent, std::move(ends), draw, stats);
     for (std::size_t c = 0; c < request.targets.size(); ++c) {
         const target_info& info = info_of(request.targets[c]);
@@ -253,7 +250,7 @@ volume run_distance_voxelizer(scene&& model, const voxelize_request& request, vo
                 ends.push_back(end = std::min(end + *layers, request.grid.extent.z));
             stats.slabs = static_cast<int>(ends.size());
             const auto drawn = std::make_shared<loaded_distances>(std::move(model), request, stats);
-            return make_late_field(
+            return make_late_volume(
                 request, ends,
                 [drawn, ends, whole = request.grid](std::size_t i) {
                     return drawn->run(whole, i == 0 ? 0 : ends[i - 1], ends[i]);

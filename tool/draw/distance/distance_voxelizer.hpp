@@ -56,11 +56,23 @@ struct distance_bytes {
 [[nodiscard]] volume run_streamed_distances(triangle_stream& model, const stream_place& place,
                                             const voxelize_request& request, voxelize_stats& stats);
 
-// A volume whose channels are drawn slab by slab as they are read: draw(i) is the field of the layers from ends[i - 1],
-// or 0, to ends[i]. It is called as often as values of a slab are asked for that is not among the last two; only the
-// first time its counts stay in `stats`, which has to outlive the volume.
-[[nodiscard]] volume make_late_field(const voxelize_request& request, std::vector<int> ends,
-                                     const std::function<volume(std::size_t)>& draw, voxelize_stats& stats);
+// A volume whose channels are drawn slab by slab as they are read: draw(i) has those of the layers from ends[i - 1], or
+// 0, to ends[i]. It is called as often as values of a slab are asked for that is not among the last two; only the first
+// time its counts stay in `stats`, which has to outlive the volume.
+[[nodiscard]] volume make_late_volume(const voxelize_request& request, std::vector<int> ends,
+                                      const std::function<volume(std::size_t)>& draw, voxelize_stats& stats);
+
+// The most layers of a slab, a multiple of `step` below extent_z + step, whose need in bytes, which grows with them, is
+// well below the room: what slabs take beside is not all known.
+template <class Need>
+[[nodiscard]] int most_layers(int extent_z, int step, double room, const Need& need_of) {
+    constexpr double used = 0.75; // of the room, by estimate
+    int steps = 1;
+    for (int more = (extent_z - 1) / step; more > 0; more /= 2)
+        while (steps + more < (extent_z + step - 1) / step && need_of((steps + more) * step) <= used * room)
+            steps += more;
+    return steps * step;
+}
 
 // True if a volume's channels are drawn as they are read.
 [[nodiscard]] bool is_drawn_late(const volume& v);

@@ -205,7 +205,7 @@ volume run_streamed_distances(triangle_stream& model, const stream_place& place,
         if (is_kept)
             field = named_failures(place.folder, [&] { return whole_field(*drawn, request); });
         else
-            field = make_late_field(
+            field = make_late_volume(
                 request, drawn->ends(), [drawn](std::size_t i) { return drawn->draw(i); }, stats);
     });
     if (is_kept) add_distance_warnings(request, stats);

@@ -9,7 +9,6 @@
 #include "mesh.hpp"
 #include "msh.hpp"
 #include "npy.hpp"
-#include "npz.hpp"
 #include "png.hpp"
 #include "scanner_images.hpp"
 #include "schem.hpp"

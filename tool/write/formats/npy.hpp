@@ -4,6 +4,10 @@
 
 // NumPy's .npy, format version 1.0: a text header and the values in C order. Shape (nz, ny, nx), or
 // (nz, ny, nx, components) for several components; bits as uint8 0/1; half floats as float16.
+//
+// NumPy's .npz: a zip archive with one CHANNEL.npy for each channel, as numpy.savez or, with compression,
+// numpy.savez_compressed writes it. Zip64 throughout, so an array may pass 4 GiB. Time stamps are fixed: the same
+// volume gives the same bytes.
 
 #include "formats.hpp"
 
@@ -18,6 +22,9 @@ namespace voxelize {
 
 // One file a channel: PATH itself for a single one, PATH with ".CHANNEL" before the extension for several.
 std::vector<std::filesystem::path> write_npy(const volume& v, const std::filesystem::path& path,
+                                             const write_options& options);
+
+std::vector<std::filesystem::path> write_npz(const volume& v, const std::filesystem::path& path,
                                              const write_options& options);
 
 // out.npy -> out.color.npy; the rule for every format that holds one channel a file.

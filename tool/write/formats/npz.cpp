@@ -1,11 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 
-#include "npz.hpp"
+#include "npy.hpp"
 
 #include "deflate.hpp"
 #include "dense_stream.hpp"
-#include "npy.hpp"
 #include "progress.hpp"
 #include "zip.hpp"
 
