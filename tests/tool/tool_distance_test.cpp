@@ -328,6 +328,17 @@ std::string bytes_of_file(const fs::path& file) {
     return bytes;
 }
 
+// The warnings of a run, sorted, without the name of its file: those of slabs come when all are drawn.
+std::vector<std::string> warnings_of(const json& stats, const std::string& name) {
+    std::vector<std::string> all;
+    for (const json& each : stats["warnings"]) {
+        all.push_back(each.get<std::string>());
+        if (const std::size_t at = all.back().find(name); at != std::string::npos) all.back().erase(at, name.size());
+    }
+    std::sort(all.begin(), all.end());
+    return all;
+}
+
 // The bytes of a run that holds the field, and its counts and warnings.
 TEST(Distance, AFieldBeyondMemoryIsDrawnInSlabs) {
     if (sanitized) return; // which takes memory of its own
@@ -373,7 +384,7 @@ TEST(Distance, AFieldBeyondMemoryIsDrawnInSlabs) {
         EXPECT_GT(b["slabs"], 1) << w.output;
         EXPECT_EQ(a["voxels"], b["voxels"]);
         EXPECT_EQ(a["distance"], b["distance"]);
-        EXPECT_EQ(a["warnings"], b["warnings"]);
+        EXPECT_EQ(warnings_of(a, "whole."), warnings_of(b, "tight."));
         int files = 0;
         for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder.path())) {
             std::string name = fs::relative(entry.path(), folder.path()).string();
