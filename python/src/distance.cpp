@@ -14,37 +14,6 @@
 namespace voxelpipe::python {
 namespace {
 
-// As voxelpipe/_distance.py has them; band: 0 is "whole". Throws ValueError.
-distance_options options_named(double band, const std::string& sign, const std::string& repair_name,
-                               const std::string& bodies_name, std::optional<std::uint64_t> max_hole_edges, int closing,
-                               bool corners) {
-    distance_options options;
-    options.band = band == 0.0 ? voxelpipe::band::whole : voxelpipe::band(band);
-    options.sample = corners ? sample::corner : sample::centre;
-    if (sign == "unsigned") {
-        if (repair_name != "none" || bodies_name != "all" || max_hole_edges || closing != 0)
-            throw nb::value_error("sign='unsigned' has no sign that a repair, bodies or closing could decide: leave "
-                                  "them out");
-        options.sign = distance_sign::none;
-        return options;
-    }
-    // The extent is that of the module's solids without one; distances have none.
-    const solid_options solid = solid_options_named(sign, "outer", repair_name, bodies_name, max_hole_edges, closing);
-    options.rule = solid.rule;
-    options.bodies = solid.bodies;
-    options.repair = solid.repair;
-    options.closing = solid.closing;
-    options.max_hole_edges = solid.max_hole_edges;
-    return options;
-}
-
-nb::dict report_distance(const status& s) {
-    nb::dict d = report_solid(s);
-    d["band_samples"] = s.distance.band_samples;
-    d["bad_points"] = s.distance.bad_points;
-    return d;
-}
-
 // Part i of the triangles begins with number first_triangles[i]. `nearest` may be none.
 nb::dict distance_field(const position_array& positions, const triangle_array& triangles,
                         const std::vector<std::uint64_t>& first_triangles, const grid& g, double band,
@@ -53,7 +22,7 @@ nb::dict distance_field(const position_array& positions, const triangle_array& t
                         const array<float, 3>& out, const std::optional<array<std::int64_t, 3>>& nearest,
                         unsigned threads) {
     const distance_options options =
-        options_named(band, sign, repair_name, bodies_name, max_hole_edges, closing, corners);
+        distance_options_named(band, sign, repair_name, bodies_name, max_hole_edges, closing, corners);
     const grid samples = corners ? g.at_corners() : g;
     expect_shape(out, samples, "the result");
     if (nearest) expect_shape(*nearest, samples, "the array of triangles");
@@ -84,7 +53,8 @@ nb::dict distance_at_points(const position_array& positions, const triangle_arra
                             const position_array& points, const std::string& sign, const std::string& repair_name,
                             const std::string& bodies_name, std::optional<std::uint64_t> max_hole_edges,
                             const array<float, 1>& out, const array<std::int64_t, 1>& nearest, unsigned threads) {
-    const distance_options options = options_named(0.0, sign, repair_name, bodies_name, max_hole_edges, 0, false);
+    const distance_options options =
+        distance_options_named(0.0, sign, repair_name, bodies_name, max_hole_edges, 0, false);
     if (out.shape(0) != points.shape(0) || nearest.shape(0) != points.shape(0))
         throw nb::value_error("the arrays to write into do not have one element a point");
     const array_view<const glm::vec3> at(reinterpret_cast<const glm::vec3*>(points.data()), points.shape(0));

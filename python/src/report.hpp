@@ -5,6 +5,7 @@
 // Shared by the modules for CPU and GPU: names of options, and a failed status as a Python exception.
 
 #include <bindings/parts.hpp>
+#include <voxelpipe/distance/distance.hpp>
 #include <voxelpipe/solid/solid.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
@@ -120,6 +121,41 @@ void report_holes(nb::dict& d, const Counters& counters) {
     d["crossings"] = s.solid.crossings;
     d["max_winding"] = s.solid.max_winding;
     report_holes(d, s.solid);
+    return d;
+}
+
+// The options of a distance from their names, as voxelpipe/_distance.py has them; band: 0 is "whole". Throws
+// ValueError.
+[[nodiscard]] inline distance_options distance_options_named(double band, const std::string& sign,
+                                                             const std::string& repair_name,
+                                                             const std::string& bodies_name,
+                                                             std::optional<std::uint64_t> max_hole_edges, int closing,
+                                                             bool corners) {
+    distance_options options;
+    options.band = band == 0.0 ? voxelpipe::band::whole : voxelpipe::band(band);
+    options.sample = corners ? sample::corner : sample::centre;
+    if (sign == "unsigned") {
+        if (repair_name != "none" || bodies_name != "all" || max_hole_edges || closing != 0)
+            throw nb::value_error("sign='unsigned' has no sign that a repair, bodies or closing could decide: leave "
+                                  "them out");
+        options.sign = distance_sign::none;
+        return options;
+    }
+    // The extent is that of the module's solids without one; distances have none.
+    const solid_options solid = solid_options_named(sign, "outer", repair_name, bodies_name, max_hole_edges, closing);
+    options.rule = solid.rule;
+    options.bodies = solid.bodies;
+    options.repair = solid.repair;
+    options.closing = solid.closing;
+    options.max_hole_edges = solid.max_hole_edges;
+    return options;
+}
+
+// report_solid(), and the counters of distances.
+[[nodiscard]] inline nb::dict report_distance(const status& s) {
+    nb::dict d = report_solid(s);
+    d["band_samples"] = s.distance.band_samples;
+    d["bad_points"] = s.distance.bad_points;
     return d;
 }
 

@@ -5,53 +5,14 @@
 import numpy as np
 import pytest
 import voxelpipe as vp
+
+from gpus import Cupy, Torch, same
 from meshes import box, sphere
-
-pytest.importorskip("voxelpipe_cuda")
-
-
-class Torch:
-    def __init__(self):
-        self.torch = pytest.importorskip("torch")
-        if not self.torch.cuda.is_available():
-            pytest.skip("no GPU")
-
-    def put(self, a):
-        return self.torch.from_numpy(np.ascontiguousarray(a)).cuda()
-
-    def is_ours(self, a):
-        return isinstance(a, self.torch.Tensor) and a.is_cuda
-
-    def get(self, a):
-        return a.cpu().numpy()
-
-
-class Cupy:
-    def __init__(self):
-        self.cupy = pytest.importorskip("cupy")
-        if self.cupy.cuda.runtime.getDeviceCount() == 0:
-            pytest.skip("no GPU")
-
-    def put(self, a):
-        return self.cupy.asarray(a)
-
-    def is_ours(self, a):
-        return isinstance(a, self.cupy.ndarray)
-
-    def get(self, a):
-        return a.get()
 
 
 @pytest.fixture(params=[Torch, Cupy], ids=["torch", "cupy"])
 def gpu(request):
     return request.param()
-
-
-def same(gpu, on_device, on_host):
-    assert gpu.is_ours(on_device)
-    a, b = gpu.get(on_device), on_host
-    assert a.dtype == b.dtype and a.shape == b.shape
-    assert a.tobytes() == b.tobytes()
 
 
 MESH = sphere(radius=0.9, levels=3)

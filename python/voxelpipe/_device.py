@@ -24,7 +24,7 @@ def _module() -> Any:
         import voxelpipe_cuda
     except ImportError as e:
         raise TypeError(
-            "the mesh is in a GPU's memory: install voxelpipe-cuda13 to draw it there, or copy it to the host, as with "
+            "the mesh is in a GPU's memory: install voxelpipe-cuda13 to work on it there, or copy it to the host, as with "
             f".cpu() or .get() ({e})"
         ) from None
     return voxelpipe_cuda._cuda
@@ -66,6 +66,9 @@ class _Torch:
 
     def vector(self, values: Sequence[float]) -> Any:
         return self.torch.tensor(values, dtype=self.torch.float64, device=self.device)
+
+    def finite(self, a: Any) -> Any:
+        return self.torch.isfinite(a)
 
     def finite_rows(self, a: Any) -> Any:
         return a[self.torch.isfinite(a).all(dim=1)]
@@ -126,6 +129,10 @@ class _Cupy:
         with self.device:
             return self.cupy.asarray(values, dtype=np.float64)
 
+    def finite(self, a: Any) -> Any:
+        with self.device:
+            return self.cupy.isfinite(a)
+
     def finite_rows(self, a: Any) -> Any:
         with self.device:
             return a[self.cupy.isfinite(a).all(axis=1)]
@@ -181,17 +188,28 @@ class DeviceMesh:
     def rounded(self, a: Any, dtype: Any) -> Any:
         return self.library.rounded(a, dtype)
 
+    def empty(self, shape: Sequence[int], dtype: Any) -> Any:
+        return self.library.empty(shape, dtype)
+
     def bounds(self) -> tuple[list[float], list[float]] | None:
         finite = self.library.finite_rows(self.vertices)
         return self.library.bounds(finite) if len(finite) else None
 
-    def call(self, grid: Grid) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int], Any, Any]:
-        """Stream, positions, triangles and grid as the module takes them; last the array that has to live on."""
+    def addresses(self, *arrays: Any) -> list[int]:
+        """Where arrays begin; 0 for None."""
+        return [0 if a is None else self.library.pointer(a) for a in arrays]
+
+    def call(
+        self, grid: Grid, relative: bool = False
+    ) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int], Any, Any]:
+        """Stream, positions, triangles and grid as the module takes them; last the array that has to live on. `relative`:
+        the grid's origin is taken away in any case, as by _mesh.Mesh.relative()."""
         lib = self.library
-        if lib.dtype_of(self.vertices) == np.float32:
+        if not relative and lib.dtype_of(self.vertices) == np.float32:
             positions, where = self.vertices, grid
         else:  # as _mesh.Mesh.positions
-            positions = lib.convert(self.vertices - lib.vector(grid._whole_origin), np.float32)
+            wide = lib.convert(self.vertices, np.float64)
+            positions = lib.convert(wide - lib.vector(grid._whole_origin), np.float32)
             where = grid._relative_to_origin()
         return (
             lib.stream(),

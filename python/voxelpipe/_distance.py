@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from . import _core
+from . import _core, _device_fields
 from ._core import Grid
 from ._device import DeviceMesh
 from ._fit import fit
@@ -30,12 +30,19 @@ from ._types import (
 )
 
 
-def _host_mesh(mesh: MeshLike, what: str = "distances") -> Mesh:
+def mesh_of_triangles(mesh: MeshLike, what: str) -> Mesh | DeviceMesh:
+    """Raises ValueError for a model of points or lines. `what`: the results, for messages."""
     m = as_mesh(mesh)
-    if isinstance(m, DeviceMesh):
-        raise TypeError(f"{what} are computed on the CPU: copy the mesh to the host, as with .cpu() or .get()")
     if isinstance(m, ModelMesh) and not len(m.triangles) and len(m.scene.lines):
         raise ValueError(f"a model of points or lines has no triangles, which {what} are of")
+    return m
+
+
+def host_mesh(mesh: MeshLike, what: str) -> Mesh:
+    """Raises TypeError for a mesh in a GPU's memory besides."""
+    m = mesh_of_triangles(mesh, what)
+    if isinstance(m, DeviceMesh):
+        raise TypeError(f"{what} are computed on the CPU: copy the mesh to the host, as with .cpu() or .get()")
     return m
 
 
@@ -84,9 +91,10 @@ def distance(
         threads: 0 takes all cores. The result is the same for any number.
         status: a dict that is filled with the call's counters, band_samples and those of solid() among them.
 
-    Returns the distances, or (distances, nearest). A mesh of torch's tensors gives tensors. Warns with OpenMeshWarning
-    where rows of samples prove that the mesh is not closed. Raises ValueError for a band that is not above 0 or not
-    finite, IndexError for a triangle that names a vertex that does not exist, TypeError for a mesh in a GPU's memory.
+    Returns the distances, or (distances, nearest). A mesh of torch's tensors gives tensors; one in a GPU's memory is
+    measured there, with the same bits. Warns with OpenMeshWarning where rows of samples prove that the mesh is not closed.
+    Raises ValueError for a band that is not above 0 or not finite, IndexError for a triangle that names a vertex that does
+    not exist.
 
     Example:
         >>> field = vp.distance(mesh, grid, band=3)
@@ -107,27 +115,18 @@ def distance(
             raise ValueError(f"band is a number of voxels above 0, or \"whole\", not {band!r}")
     check_solid_numbers(max_hole_edges, closing)
     corners = bool(corners)
-    m = _host_mesh(mesh)
-    positions, where = m.positions(grid)
+    m = mesh_of_triangles(mesh, "distances")
     shape = tuple(n + corners for n in grid.shape)
-    out = np.empty(shape, np.float32)
-    numbers = np.empty(shape, np.int64) if nearest else None
-    counts = _core.distance_field(
-        positions,
-        m.triangles,
-        list(m.first_triangles),
-        where,
-        voxels,
-        sign,
-        repair,
-        bodies,
-        max_hole_edges,
-        closing,
-        corners,
-        out,
-        numbers,
-        threads,
-    )
+    out = m.empty(shape, np.float32)
+    numbers = m.empty(shape, np.int64) if nearest else None
+    options = (voxels, sign, repair, bodies, max_hole_edges, closing, corners)
+    if isinstance(m, DeviceMesh):
+        counts = _device_fields.distance(m, grid, options, out, numbers)
+    else:
+        positions, where = m.positions(grid)
+        counts = _core.distance_field(
+            positions, m.triangles, list(m.first_triangles), where, *options, out, numbers, threads
+        )
     if repair == "exterior" and not (out < 0).any():
         refuse_grid_within(m, grid, repair, bodies, closing, threads)
     take_counts(counts, status)
@@ -135,6 +134,19 @@ def distance(
     if numbers is None:
         return m.to_caller(out)
     return m.to_caller(out), m.to_caller(numbers)
+
+
+def _placed_points(m: Mesh, at: np.ndarray, grid: Grid) -> tuple[np.ndarray, Grid, np.ndarray]:
+    """Positions, the grid in which they are to be snapped, and points in float32. The grid's origin is taken away from all
+    of them where float32 does not hold the points as they are."""
+    positions, where, reference = m.placed(grid)
+    with np.errstate(over="ignore", invalid="ignore"):
+        finite = at[np.isfinite(at)]
+        if not any(reference) and (finite.astype(np.float32) != finite).any():
+            positions, where, reference = m.relative(grid)
+        if any(reference):
+            at = at.astype(np.float64) - np.asarray(reference)
+        return positions, where, np.ascontiguousarray(at, np.float32)
 
 
 def distance_at(
@@ -156,7 +168,7 @@ def distance_at(
     mesh's longest side, whose lattice is finer than 2^-23 of that. Otherwise as distance() with band="whole".
 
     Args:
-        mesh, points: what voxelize() takes, and positions (n, 3).
+        mesh, points: what voxelize() takes, and positions (n, 3), in a GPU's memory where the mesh is.
         grid: whose lattice positions are snapped to.
         sign, repair, bodies, max_hole_edges: as in distance(); repair is "none", "close_holes" or "winding".
         threads: 0 takes all cores.
@@ -178,37 +190,23 @@ def distance_at(
     check_solid_numbers(max_hole_edges, 0)
     if grid is not None:
         check_grid(grid, "distance_at")
-    m = _host_mesh(mesh)
+    m = mesh_of_triangles(mesh, "distances")
     at = m.take(points, "the array of points")
     if at.ndim != 2 or at.shape[1] != 3:
-        raise ValueError(f"points are an array (n, 3), not {at.shape}")
-    if at.dtype.kind not in "fiu":
-        raise ValueError(f"points are numbers, not {at.dtype}")
+        raise ValueError(f"points are an array (n, 3), not {tuple(at.shape)}")
+    if m.dtype_of(at).kind not in "fiu":
+        raise ValueError(f"points are numbers, not {m.dtype_of(at)}")
     chosen = grid if grid is not None else fit(mesh, 1024)
-    positions, where, reference = m.placed(chosen)
-    with np.errstate(over="ignore", invalid="ignore"):
-        finite = at[np.isfinite(at)]
-        if not any(reference) and (finite.astype(np.float32) != finite).any():
-            positions, where, reference = m.relative(chosen)
-        if any(reference):
-            at = at.astype(np.float64) - np.asarray(reference)
-        single = np.ascontiguousarray(at, np.float32)
-    out = np.empty(len(at), np.float32)
-    numbers = np.empty(len(at), np.int64)
-    counts = _core.distance_at(
-        positions,
-        m.triangles,
-        list(m.first_triangles),
-        where,
-        single,
-        sign,
-        repair,
-        bodies,
-        max_hole_edges,
-        out,
-        numbers,
-        threads,
-    )
+    out = m.empty((len(at),), np.float32)
+    numbers = m.empty((len(at),), np.int64)
+    options = (sign, repair, bodies, max_hole_edges)
+    if isinstance(m, DeviceMesh):
+        counts = _device_fields.distance_at(m, at, chosen, options, out, numbers)
+    else:
+        positions, where, single = _placed_points(m, at, chosen)
+        counts = _core.distance_at(
+            positions, m.triangles, list(m.first_triangles), where, single, *options, out, numbers, threads
+        )
     take_counts(counts, status)
     _warn_of_holes(counts, " rows through points", repair)
     if not nearest:

@@ -9,7 +9,7 @@ import numpy as np
 
 from . import _core
 from ._core import Grid
-from ._distance import _host_mesh
+from ._distance import host_mesh
 from ._solid import OpenMeshWarning
 from ._surface import listed_for, take_counts
 from ._types import (
@@ -152,7 +152,7 @@ def fractions(
         >>> area = np.linalg.norm(cells["area_vector"], axis=-1)  # of one plane a voxel
     """
     wanted = _checked("fractions", grid, of, CellValue, bodies, repair, max_hole_edges, threads, status)
-    m = _host_mesh(mesh, "fractions")
+    m = host_mesh(mesh, "fractions")
     positions, where = m.positions(grid)
     parts = _parts(m, bodies)
     has_areas = "area_vector" in wanted
@@ -281,7 +281,7 @@ def sparse_fractions(
     wanted = _checked(
         "sparse_fractions", grid, of, ListedCellValue, bodies, repair, max_hole_edges, threads, status
     )
-    m = _host_mesh(mesh, "fractions")
+    m = host_mesh(mesh, "fractions")
     positions, where = m.positions(grid)
     counts: dict[str, int] = {}
     results = []
@@ -349,7 +349,7 @@ def fraction_lists(
         >>> volumes = np.bincount(lists.bodies, lists.fractions) * np.prod(grid.voxel_size)
     """
     _checked("fraction_lists", grid, "fraction", CellValue, "each", repair, max_hole_edges, threads, status)
-    m = _host_mesh(mesh, "fractions")
+    m = host_mesh(mesh, "fractions")
     positions, where = m.positions(grid)
     voxels, offsets, bodies, fractions_of, counts = _core.fraction_lists(
         positions, m.triangles, list(m.first_triangles), where, repair == "close_holes", max_hole_edges, threads

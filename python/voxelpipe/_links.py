@@ -8,7 +8,7 @@ import numpy as np
 
 from . import _core
 from ._core import Grid
-from ._distance import _host_mesh
+from ._distance import host_mesh
 from ._arrays import to_torch
 from ._surface import listed_for, take_counts
 from ._types import MeshLike, check_call, whole_number
@@ -64,7 +64,7 @@ def links(
     check_call("links", grid, "conservative", threads, status)
     if whole_number("neighbours", neighbours) not in (18, 26):
         raise ValueError(f"neighbours is 18 or 26, not {neighbours}")
-    m = _host_mesh(mesh, "links")
+    m = host_mesh(mesh, "links")
     positions, where = m.positions(grid)
     voxels, q, triangles, bodies, directions, counts = _core.links(
         positions, m.triangles, list(m.first_triangles), where, neighbours, threads

@@ -26,7 +26,7 @@ class Mesh:
     first_triangles: tuple[int, ...]  # of each part
     to_caller: Callable[[np.ndarray], Any]  # a result as the caller's kind of array
 
-    # The same four for arrays on a GPU: _device.DeviceMesh.
+    # The same for arrays on a GPU: _device.DeviceMesh.
     def take(self, a: Any, what: str) -> np.ndarray:
         return to_numpy(a, what)
 
@@ -38,6 +38,9 @@ class Mesh:
 
     def rounded(self, a: np.ndarray, dtype: Any) -> np.ndarray:
         return np.rint(a).astype(dtype)
+
+    def empty(self, shape: Sequence[int], dtype: Any) -> np.ndarray:
+        return np.empty(shape, dtype)
 
     def bounds(self) -> tuple[list[float], list[float]] | None:
         """The lowest and highest corner of the vertices that are finite, if there are any."""

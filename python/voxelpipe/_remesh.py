@@ -11,7 +11,7 @@ from ._arrays import to_numpy
 from ._axes import as_voxels
 from ._bake import _attributes, _Attribute
 from ._core import Grid
-from ._distance import _host_mesh, _warn_of_holes
+from ._distance import _warn_of_holes, host_mesh
 from ._solid import refuse_grid_within
 from ._surface import take_counts
 from ._types import (
@@ -143,7 +143,7 @@ def remesh(
         check_choice(what, value, choices)
     _check_numbers(level, min_component)
     check_solid_numbers(max_hole_edges, closing)
-    m = _host_mesh(mesh, "remeshes")
+    m = host_mesh(mesh, "remeshes")
     taken = [name for name in attributes or {} if name in ("cell", "sheet", "source")]
     if taken:
         raise ValueError(f"{taken[0]!r} is a result of remesh() by itself; give the attribute another name")

@@ -6,6 +6,7 @@
 // other. All arrays are in the device's memory, and the caller's. Every call waits for its stream at its end.
 
 #include <bindings/device_stream.hpp>
+#include <voxelpipe/distance/distance.hpp>
 #include <voxelpipe/solid/solid.hpp>
 #include <voxelpipe/voxelpipe.hpp>
 
@@ -45,6 +46,17 @@ struct device_values {
 [[nodiscard]] status examine_solid(const device_stream& on, const mesh_view<>& mesh,
                                    const std::vector<std::uint64_t>& first_triangles, const grid& g,
                                    const solid_options& options);
+
+// vp::voxelize_distance of the same bodies: (nz, ny, nx), with sample::corner one more along each axis. nearest: null,
+// or the numbers of the nearest triangles among all parts, -1 beyond the band.
+[[nodiscard]] status draw_distance(const device_stream& on, const mesh_view<>& mesh,
+                                   const std::vector<std::uint64_t>& first_triangles, const grid& g,
+                                   const distance_options& options, float* out, std::int64_t* nearest);
+// vp::distance_at of the same bodies; `out` has one element a point.
+[[nodiscard]] status measure_points(const device_stream& on, const mesh_view<>& mesh,
+                                    const std::vector<std::uint64_t>& first_triangles, const grid& g,
+                                    array_view<const glm::vec3> points, const distance_options& options,
+                                    const distance_arrays& out);
 
 // Writes columns [first, first + count) of `out`, (nz, ny, nx, columns); `fill` where there is no fragment.
 [[nodiscard]] status bake(const device_stream& on, const mesh_view<>& mesh, const grid& g, coverage rule,

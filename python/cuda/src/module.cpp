@@ -1,41 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
-#include "../../src/grid_state.hpp"
-#include "device_calls.hpp"
-
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
+#include "arguments.hpp"
 
 namespace voxelpipe::python {
 namespace {
-
-// (address, rows) of an array in the device's memory, as voxelpipe/_device.py takes it from the caller's array, which
-// lives longer than the call.
-using device_array = std::tuple<std::uintptr_t, std::size_t>;
-
-template <class T>
-T* pointer(std::uintptr_t address) {
-    return reinterpret_cast<T*>(address);
-}
-
-// A call's mesh, grid and stream.
-struct call {
-    device_stream on;
-    mesh_view<> mesh;
-    grid where;
-};
-using stream_of = std::tuple<int, std::uintptr_t>; // device, cudaStream_t
-
-call make_call(const stream_of& on, const device_array& positions, const device_array& triangles,
-               const grid_state& state) {
-    const auto [positions_at, num_positions] = positions;
-    const auto [triangles_at, num_triangles] = triangles;
-    return {{std::get<0>(on), std::get<1>(on)},
-            {array_view<const glm::vec3>(pointer<const glm::vec3>(positions_at), num_positions),
-             array_view<const glm::uvec3>(pointer<const glm::uvec3>(triangles_at), num_triangles)},
-            grid_of(state)};
-}
 
 combine combine_named(const std::string& name) {
     return named<combine>("blend", name,
@@ -61,16 +29,6 @@ device_values<T> make_values(const call& c, const columns_of& values, bool per_t
     const device_values<T> made{pointer<const T>(address), columns, first, count, per_triangle, combine_named(blend)};
     if (std::is_integral_v<T> && made.how == combine::mean) throw nb::value_error("integers have no mean");
     return made;
-}
-
-template <class F>
-nb::dict run(const F& f) {
-    status s;
-    {
-        const nb::gil_scoped_release released;
-        s = f();
-    }
-    return report(s);
 }
 
 // Sizes of a list that is on the device, until copy() has put it into the caller's arrays.
@@ -125,12 +83,9 @@ void bind_dense(nb::module_& m) {
               const call c = make_call(on, positions, triangles, g);
               const solid_options options =
                   solid_options_named(fill, extent, repair_name, bodies_name, max_hole_edges, closing);
-              status s;
-              {
-                  const nb::gil_scoped_release released;
-                  s = draw_solid(c.on, c.mesh, first_triangles, c.where, options, pointer<std::uint8_t>(out));
-              }
-              return report_solid(s);
+              return report_solid(unlocked([&] {
+                  return draw_solid(c.on, c.mesh, first_triangles, c.where, options, pointer<std::uint8_t>(out));
+              }));
           });
     m.def("diagnose_repair", [](const stream_of& on, const device_array& positions, const device_array& triangles,
                                 const std::vector<std::uint64_t>& first_triangles, const grid_state& g,
@@ -138,12 +93,7 @@ void bind_dense(nb::module_& m) {
         const call c = make_call(on, positions, triangles, g);
         const solid_options options =
             solid_options_named("nonzero", "outer", "exterior", bodies_name, std::nullopt, closing);
-        status s;
-        {
-            const nb::gil_scoped_release released;
-            s = examine_solid(c.on, c.mesh, first_triangles, c.where, options);
-        }
-        return report_flood(s);
+        return report_flood(unlocked([&] { return examine_solid(c.on, c.mesh, first_triangles, c.where, options); }));
     });
     m.def("bake_float", [](const stream_of& on, const device_array& positions, const device_array& triangles,
                            const grid_state& g, const std::string& rule, const columns_of& values, bool per_triangle,
@@ -214,4 +164,5 @@ NB_MODULE(_cuda, m) {
     m.doc() = "The part of voxelpipe that runs on GPUs. voxelpipe/_device.py prepares its arrays; use voxelpipe.";
     voxelpipe::python::bind_dense(m);
     voxelpipe::python::bind_lists(m);
+    voxelpipe::python::bind_fields(m);
 }
