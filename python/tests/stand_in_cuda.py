@@ -52,3 +52,14 @@ def distance_at(on, positions, triangles, firsts, state, points, *options_and_ou
     arrays = (at(out, (n,), np.float32), at(nearest, (n,), np.int64))
     where = at(points[0], (n, 3), np.float32)
     return _core.distance_at(*mesh_of(positions, triangles), firsts, grid_of(state), where, *options, *arrays, 0)
+
+
+def fractions(on, positions, triangles, state, axis, close_holes, max_hole_edges, out, faces, inner):
+    g = grid_of(state)
+    wide = list(g.shape)
+    wide[2 - axis] += 1
+    shapes = [wide, (*g.shape, 3), (*wide, 3), (*g.shape, 3), g.shape, (*g.shape, 3), g.shape]
+    types = [np.float64, np.float64, np.float32, np.float32, np.float64, np.float32, np.bool_]
+    arrays = [at(a, shape, dtype) for a, shape, dtype in zip((*faces, *inner), shapes, types)]
+    given = (at(out, g.shape, np.float32), *arrays, close_holes, max_hole_edges, 0)
+    return _core.fractions(*mesh_of(positions, triangles), g, axis, *given)

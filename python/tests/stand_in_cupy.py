@@ -128,6 +128,10 @@ def empty(shape, dtype):
     return ndarray(made)
 
 
+def zeros(shape, dtype):
+    return ndarray(np.zeros(shape, dtype))
+
+
 def isfinite(a):
     return np.isfinite(a)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""Distances of meshes in a GPU's memory have the bits of the CPU's. Needs a GPU,
+"""Distances and fractions of meshes in a GPU's memory have the bits of the CPU's. Needs a GPU,
 voxelpipe-cuda13, and torch or CuPy; without them a stand-in tests what lies between the functions and the GPU's module."""
 
 import warnings
@@ -127,8 +127,30 @@ def test_positions_in_double_keep_their_precision(gpu):
     grid = vp.fit(far, 20)
     mesh = put(gpu, far)
     compare(gpu, vp.distance, mesh, far, grid)
+    compare(gpu, vp.fractions, mesh, far, grid)
     points = POINTS + 4.7e6
     same(gpu, vp.distance_at(mesh, gpu.put(points)), vp.distance_at(far, points))
+
+
+# ---- fractions --------------------------------------------------------------------------------------------------------
+
+FACES = ("aperture_x", "aperture_y", "aperture_z", "face_centroid_x", "face_centroid_y", "face_centroid_z", "area_vector")
+ALL = ("fraction", *FACES, "centroid", "area", "area_centroid", "multi_cut")
+
+
+@pytest.mark.parametrize("of", ["fraction", "aperture_y", "multi_cut", ("area", "centroid"), ("area_vector",), "face_centroid_y", FACES, ALL])
+def test_fractions(gpu, of):
+    counts = compare(gpu, vp.fractions, put(gpu, MESH), MESH, GRID, of=of)
+    assert counts["cut_voxels"] > 100
+    compare(gpu, vp.fractions, put(gpu, PARTS), PARTS, GRID.crop((2, 3, 4), (11, 12, 13)), of=of, bodies="each")
+
+
+@pytest.mark.parametrize("repair", [{}, {"repair": "close_holes"}, {"repair": "close_holes", "max_hole_edges": 3}])
+def test_fractions_of_an_open_mesh(gpu, repair):
+    counts = compare(gpu, vp.fractions, put(gpu, OPEN), OPEN, GRID, of=ALL, **repair)
+    assert (counts["open_rows"] == 0) == ("repair" in repair and "max_hole_edges" not in repair)
+    empty = (MESH[0], MESH[1][:0])
+    compare(gpu, vp.fractions, put(gpu, empty), empty, GRID, of=ALL, **repair)
 
 
 # ---- mistakes ---------------------------------------------------------------------------------------------------------
@@ -145,6 +167,7 @@ def test_mistakes_are_told_as_on_the_cpu(gpu):
         (lambda m: vp.distance(m, vp.Grid((-0.1, -0.1, -0.1), 0.02, (10, 10, 10)), repair="exterior"), mesh, MESH),
         (lambda m: vp.distance_at(m, m[0], GRID, repair="vote"), mesh, MESH),
         (lambda m: vp.distance_at(m, m[0][:, :2], GRID), mesh, MESH),
+        (lambda m: vp.fractions(m, GRID, of="volume"), mesh, MESH),
     ):
         assert message_of(lambda: f(on_device)) == message_of(lambda: f(on_host))
 
@@ -157,6 +180,7 @@ def test_triangles_without_vertices_are_named(gpu):
         for f in (
             lambda: vp.distance(mesh, GRID),
             lambda: vp.distance_at(mesh, gpu.put(POINTS), GRID),
+            lambda: vp.fractions(mesh, GRID),
         ):
             with pytest.raises(IndexError, match="triangle 6"):
                 f()
@@ -164,8 +188,10 @@ def test_triangles_without_vertices_are_named(gpu):
 
 def test_what_a_gpu_does_not_do_is_said(gpu):
     mesh = put(gpu, MESH)
-    with pytest.raises(TypeError, match="fractions are computed on the CPU"):
-        vp.fractions(mesh, GRID)
+    with pytest.raises(TypeError, match="sparse fractions are computed on the CPU"):
+        vp.sparse_fractions(mesh, GRID)
+    with pytest.raises(TypeError, match="fraction lists are computed on the CPU"):
+        vp.fraction_lists(mesh, GRID)
     with pytest.raises(TypeError, match="links are computed on the CPU"):
         vp.links(mesh, GRID)
 

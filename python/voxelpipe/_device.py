@@ -61,6 +61,9 @@ class _Torch:
     def empty(self, shape: Sequence[int], dtype: Any) -> Any:
         return self.torch.empty(tuple(shape), dtype=getattr(self.torch, np.dtype(dtype).name), device=self.device)
 
+    def zeros(self, shape: Sequence[int], dtype: Any) -> Any:
+        return self.torch.zeros(tuple(shape), dtype=getattr(self.torch, np.dtype(dtype).name), device=self.device)
+
     def as_bool(self, a: Any) -> Any:
         return a.view(self.torch.bool)
 
@@ -121,6 +124,10 @@ class _Cupy:
     def empty(self, shape: Sequence[int], dtype: Any) -> Any:
         with self.device:
             return self.cupy.empty(tuple(shape), dtype)
+
+    def zeros(self, shape: Sequence[int], dtype: Any) -> Any:
+        with self.device:
+            return self.cupy.zeros(tuple(shape), dtype)
 
     def as_bool(self, a: Any) -> Any:
         return a.view(np.bool_)
@@ -190,6 +197,9 @@ class DeviceMesh:
 
     def empty(self, shape: Sequence[int], dtype: Any) -> Any:
         return self.library.empty(shape, dtype)
+
+    def zeros(self, shape: Sequence[int], dtype: Any) -> Any:
+        return self.library.zeros(shape, dtype)
 
     def bounds(self) -> tuple[list[float], list[float]] | None:
         finite = self.library.finite_rows(self.vertices)

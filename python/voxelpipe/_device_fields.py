@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""Distances from meshes in a GPU's memory, as _device has what draws."""
+"""Distances and fractions of meshes in a GPU's memory, as _device has what draws."""
 
 from __future__ import annotations
 
@@ -36,5 +36,19 @@ def distance_at(
     at = (lib.pointer(single), len(single))
     counts: dict[str, int] = _module().distance_at(
         stream, positions, triangles, list(m.first_triangles), state, at, *options, *m.addresses(out, nearest)
+    )
+    return counts
+
+
+def fractions(
+    m: DeviceMesh, part: tuple[int, int], grid: Grid, axis: int, arrays: Sequence[Any], options: Sequence[Any]
+) -> dict[str, int]:
+    """`part`: first triangle and the one after the last. arrays: fractions, then None where nobody asked: apertures, area
+    vectors, centroids of faces, centroids, areas, their centroids, marks. options: close_holes, max_hole_edges."""
+    stream, positions, (first, _), state, _positions = m.call(grid)
+    triangles = (first + 12 * part[0], part[1] - part[0])
+    out, *others = m.addresses(*arrays)
+    counts: dict[str, int] = _module().fractions(
+        stream, positions, triangles, state, axis, *options, out, tuple(others[:3]), tuple(others[3:])
     )
     return counts

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import warnings
-from typing import Any, Literal, NamedTuple, Sequence, overload
+from typing import Any, Callable, Dict, Literal, NamedTuple, Sequence, Tuple, overload
 
 import numpy as np
 
-from . import _core
+from . import _core, _device_fields
 from ._core import Grid
-from ._distance import host_mesh
+from ._device import DeviceMesh
+from ._distance import host_mesh, mesh_of_triangles
+from ._mesh import Mesh
 from ._solid import OpenMeshWarning
 from ._surface import listed_for, take_counts
 from ._types import (
@@ -64,6 +66,24 @@ def _warn_if_open(counts: dict[str, int], rows: int) -> None:
             OpenMeshWarning,
             stacklevel=3,
         )
+
+
+# Fills arrays by rows along an axis, of the triangles of one body; gives the counters. The arrays: fractions, then None where
+# nobody asked: apertures along the axis, area vectors, centroids of faces, and what _WITHIN names.
+_Measure = Callable[[Tuple[int, int], int, Sequence[Any]], Dict[str, int]]
+
+
+def _measure(m: Mesh, grid: Grid, options: Sequence[Any], threads: int) -> _Measure:
+    positions, where = m.positions(grid)
+
+    def measure(part: tuple[int, int], axis: int, arrays: Sequence[Any]) -> dict[str, int]:
+        return _core.fractions(positions, m.triangles[part[0] : part[1]], where, axis, *arrays, *options, threads)
+
+    return measure
+
+
+def _measure_there(m: DeviceMesh, grid: Grid, options: Sequence[Any]) -> _Measure:
+    return lambda part, axis, arrays: _device_fields.fractions(m, part, grid, axis, arrays, options)
 
 
 @overload
@@ -141,9 +161,9 @@ def fractions(
             asked for whose triangles do not balance; lost_centroids, voxels that have their centre instead; and with
             "close_holes" hole_edges, holes and the cones that close them, after which open_edges are those that are left.
 
-    Returns the values; a mesh of torch's tensors gives tensors. Warns with OpenMeshWarning where rows prove that the mesh
-    is not closed. Raises IndexError for a triangle that names a vertex that does not exist, TypeError for a mesh in a GPU's
-    memory, ValueError for a name of `of` that there is not.
+    Returns the values; a mesh of torch's tensors gives tensors, and one in a GPU's memory is measured there, with the same
+    bits. Warns with OpenMeshWarning where rows prove that the mesh is not closed. Raises IndexError for a triangle that
+    names a vertex that does not exist, ValueError for a name of `of` that there is not.
 
     Example:
         >>> part = vp.fractions(mesh, grid)
@@ -152,47 +172,33 @@ def fractions(
         >>> area = np.linalg.norm(cells["area_vector"], axis=-1)  # of one plane a voxel
     """
     wanted = _checked("fractions", grid, of, CellValue, bodies, repair, max_hole_edges, threads, status)
-    m = host_mesh(mesh, "fractions")
-    positions, where = m.positions(grid)
+    m = mesh_of_triangles(mesh, "fractions")
     parts = _parts(m, bodies)
     has_areas = "area_vector" in wanted
     # Rows along x come last: the fractions and the counters are theirs.
     axes = [a for a in (2, 1) if has_areas or _APERTURES[a] in wanted or _FACE_CENTROIDS[a] in wanted] + [0]
-    out: dict[str, np.ndarray] = {"fraction": np.empty((len(parts), *grid.shape), np.float32)}
+    out: dict[str, Any] = {"fraction": m.empty((len(parts), *grid.shape), np.float32)}
     if has_areas:
-        out["area_vector"] = np.zeros((len(parts), *grid.shape, 3))
+        out["area_vector"] = m.zeros((len(parts), *grid.shape, 3), np.float64)
     for axis, (faces, middles) in enumerate(zip(_APERTURES, _FACE_CENTROIDS)):
         shape = list(grid.shape)
         shape[2 - axis] += 1
         if faces in wanted:
-            out[faces] = np.zeros((len(parts), *shape))
+            out[faces] = m.zeros((len(parts), *shape), np.float64)
         if middles in wanted:
-            out[middles] = np.zeros((len(parts), *shape, 3), np.float32)
+            out[middles] = m.zeros((len(parts), *shape, 3), np.float32)
     for part, (scalar, tail) in _WITHIN.items():
         if part in wanted:
-            out[part] = np.zeros((len(parts), *grid.shape, *tail), scalar)
+            out[part] = m.zeros((len(parts), *grid.shape, *tail), scalar)
+    options = (repair == "close_holes", max_hole_edges)
+    measure = _measure_there(m, grid, options) if isinstance(m, DeviceMesh) else _measure(m, grid, options, threads)
     counts: dict[str, int] = {}
     open_rows = rows = 0
-    for body, (first, end) in enumerate(parts):
+    for body, triangles in enumerate(parts):
         for axis in axes:
-            within = [out[part][body] if part in out and axis == 0 else None for part in _WITHIN]
-            of_body = _core.fractions(
-                positions,
-                m.triangles[first:end],
-                where,
-                axis,
-                out["fraction"][body],
-                out[_APERTURES[axis]][body] if _APERTURES[axis] in out else None,
-                out["area_vector"][body] if has_areas else None,
-                out[_FACE_CENTROIDS[axis]][body] if _FACE_CENTROIDS[axis] in out else None,
-                within[0],
-                within[1],
-                within[2],
-                within[3],
-                repair == "close_holes",
-                max_hole_edges,
-                threads,
-            )
+            names = ["fraction", _APERTURES[axis], "area_vector", _FACE_CENTROIDS[axis]]
+            names += list(_WITHIN) if axis == 0 else [""] * len(_WITHIN)
+            of_body = measure(triangles, axis, [out[name][body] if name in out else None for name in names])
             open_rows += of_body["open_rows"]
             rows += int(np.prod(grid.shape)) // max(grid.shape[2 - axis], 1)
         counts = {name: counts.get(name, 0) + count for name, count in of_body.items()}
@@ -270,7 +276,8 @@ def sparse_fractions(
         SparseFractions(voxels, values, cubes, cube_values), with "each" a list of them. A voxel is listed, or lies in a
         cube, if a triangle cuts it or its fraction is not 0. A mesh of torch's tensors gives tensors.
 
-    Warns and raises as fractions() does. Raises MemoryError where the lists do not fit.
+    Warns and raises as fractions() does. Raises MemoryError where the lists do not fit, TypeError for a mesh in a GPU's
+    memory.
 
     Example:
         >>> grid = vp.fit(mesh, 4096)
@@ -281,7 +288,7 @@ def sparse_fractions(
     wanted = _checked(
         "sparse_fractions", grid, of, ListedCellValue, bodies, repair, max_hole_edges, threads, status
     )
-    m = host_mesh(mesh, "fractions")
+    m = host_mesh(mesh, "sparse fractions")
     positions, where = m.positions(grid)
     counts: dict[str, int] = {}
     results = []
@@ -340,7 +347,8 @@ def fraction_lists(
     Returns:
         FractionLists, whose arrays are tensors for a mesh of tensors.
 
-    Warns and raises as fractions() does. Raises MemoryError where the lists do not fit.
+    Warns and raises as fractions() does. Raises MemoryError where the lists do not fit, TypeError for a mesh in a GPU's
+    memory.
 
     Example:
         >>> lists = vp.fraction_lists([hull, engine, cargo], grid)
@@ -349,7 +357,7 @@ def fraction_lists(
         >>> volumes = np.bincount(lists.bodies, lists.fractions) * np.prod(grid.voxel_size)
     """
     _checked("fraction_lists", grid, "fraction", CellValue, "each", repair, max_hole_edges, threads, status)
-    m = host_mesh(mesh, "fractions")
+    m = host_mesh(mesh, "fraction lists")
     positions, where = m.positions(grid)
     voxels, offsets, bodies, fractions_of, counts = _core.fraction_lists(
         positions, m.triangles, list(m.first_triangles), where, repair == "close_holes", max_hole_edges, threads

@@ -42,6 +42,9 @@ class Mesh:
     def empty(self, shape: Sequence[int], dtype: Any) -> np.ndarray:
         return np.empty(shape, dtype)
 
+    def zeros(self, shape: Sequence[int], dtype: Any) -> np.ndarray:
+        return np.zeros(shape, dtype)
+
     def bounds(self) -> tuple[list[float], list[float]] | None:
         """The lowest and highest corner of the vertices that are finite, if there are any."""
         finite = np.isfinite(self.vertices).all(axis=1)

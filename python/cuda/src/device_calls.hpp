@@ -5,6 +5,8 @@
 // The calls of the module for GPUs, without CUDA or Python: what nvcc compiles on one side and the bindings on the
 // other. All arrays are in the device's memory, and the caller's. Every call waits for its stream at its end.
 
+#include "../../src/cell_shaders.hpp"
+
 #include <bindings/device_stream.hpp>
 #include <voxelpipe/distance/distance.hpp>
 #include <voxelpipe/solid/solid.hpp>
@@ -57,6 +59,11 @@ struct device_values {
                                     const std::vector<std::uint64_t>& first_triangles, const grid& g,
                                     array_view<const glm::vec3> points, const distance_options& options,
                                     const distance_arrays& out);
+
+// vp::voxelize_cells of all triangles as one body: fractions (nz, ny, nx), and what else is asked for.
+[[nodiscard]] status draw_fractions(const device_stream& on, const mesh_view<>& mesh, const grid& g,
+                                    const cell_options& options, float* out, const face_arrays& faces,
+                                    const inner_arrays& inner);
 
 // Writes columns [first, first + count) of `out`, (nz, ny, nx, columns); `fill` where there is no fragment.
 [[nodiscard]] status bake(const device_stream& on, const mesh_view<>& mesh, const grid& g, coverage rule,

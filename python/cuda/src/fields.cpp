@@ -34,6 +34,24 @@ void bind_fields(nb::module_& m) {
               return report_distance(
                   unlocked([&] { return measure_points(c.on, c.mesh, first_triangles, c.where, at, options, to); }));
           });
+    // The arrays' addresses: apertures, area vectors and centroids of faces; centroids, areas, their centroids and
+    // marks. 0 where nobody asked.
+    m.def("fractions",
+          [](const stream_of& on, const device_array& positions, const device_array& triangles, const grid_state& g,
+             int axis, bool close_holes, std::optional<std::uint64_t> max_hole_edges, std::uintptr_t out,
+             const std::array<std::uintptr_t, 3>& faces, const std::array<std::uintptr_t, 4>& inner) {
+              const call c = make_call(on, positions, triangles, g);
+              const cell_options options = cell_options_of(axis, close_holes, max_hole_edges);
+              face_arrays of_faces;
+              of_faces.apertures = pointer<double>(faces[0]);
+              of_faces.areas = pointer<double>(faces[1]);
+              of_faces.centroids = pointer<float>(faces[2]);
+              const inner_arrays within{pointer<float>(inner[0]), pointer<double>(inner[1]), pointer<float>(inner[2]),
+                                        pointer<bool>(inner[3])};
+              return report_cells(unlocked([&] {
+                  return draw_fractions(c.on, c.mesh, c.where, options, pointer<float>(out), of_faces, within);
+              }));
+          });
 }
 
 } // namespace voxelpipe::python
