@@ -48,16 +48,7 @@ void expect_shape(const Array& a, const grid& g, const char* what, std::initiali
     std::vector<std::size_t> wanted{static_cast<std::size_t>(g.extent.z), static_cast<std::size_t>(g.extent.y),
                                     last_axis != 0 ? last_axis : static_cast<std::size_t>(g.extent.x)};
     wanted.insert(wanted.end(), tail);
-    const std::vector<std::size_t> found(a.shape_ptr(), a.shape_ptr() + a.ndim());
-    if (found == wanted) return;
-    const auto text = [](const std::vector<std::size_t>& shape) {
-        std::string t;
-        for (const std::size_t n : shape) t += (t.empty() ? "(" : ", ") + std::to_string(n);
-        return t + ')';
-    };
-    throw nb::value_error(
-        (std::string(what) + " has the shape " + text(found) + ", the grid's is " + text(wanted) + " (nz, ny, nx)")
-            .c_str());
+    expect_shape(std::vector<std::size_t>(a.shape_ptr(), a.shape_ptr() + a.ndim()), wanted, what);
 }
 
 // An array of NumPy that owns `values`.

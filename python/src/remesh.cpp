@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 // SPDX-License-Identifier: Apache-2.0
 #include "bricks.hpp"
-#include "report.hpp"
+#include "surface_options.hpp"
+#include "surface_values.hpp"
 
 #include <bindings/parts.hpp>
 #include <voxelpipe/surfaces/remesh_sparse.hpp>
@@ -18,24 +19,6 @@
 
 namespace voxelpipe::python {
 namespace {
-
-place place_named(const std::string& name) {
-    return name == "corner" ? place::corner : name == "mean" ? place::mean : place::sharp;
-}
-
-nb::dict report_surface(const status& s) {
-    nb::dict d = report_solid(s);
-    d["components"] = s.surface.components;
-    d["components_left_out"] = s.surface.components_left_out;
-    d["cone_crossings"] = s.surface.cone_crossings;
-    d["made_crossings"] = s.surface.made_crossings;
-    d["nan_samples"] = s.surface.nan_samples;
-    d["nearest_values"] = s.surface.nearest_values;
-    d["embed_rounds"] = s.surface.embed_rounds;
-    d["moved_vertices"] = s.surface.moved_vertices;
-    d["intersecting_pairs"] = s.surface.intersecting_pairs;
-    return d;
-}
 
 // (vertices, faces, cell, sheet, source, counters); source is empty where the surface has none. `world`: the grid of
 // the samples, as vertices are to be placed.
@@ -85,53 +68,10 @@ nb::tuple made_surface(const grid& world, unsigned threads, const Make& make) {
 template <class T>
 using value_array = nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
-// Values of a call: columns of floats, then of integers; each those of vertices before those of triangles.
 template <class T>
-struct value_columns {
-    const T *of_vertices, *of_triangles;
-    std::size_t num_of_vertices, num_of_triangles;
-
-    value_columns(const value_array<T>& vertices, const value_array<T>& triangles)
-        : of_vertices(vertices.data()), of_triangles(triangles.data()), num_of_vertices(vertices.shape(1)),
-          num_of_triangles(triangles.shape(1)) {}
-    [[nodiscard]] std::size_t count() const { return num_of_vertices + num_of_triangles; }
-};
-
-// Floats in fours, interpolated where they are of vertices; integers of the triangle or its first vertex.
-template <std::size_t Fours, std::size_t Integers>
-struct column_shader {
-    const glm::uvec3* triangles; // of all parts
-    value_columns<float> floats;
-    value_columns<std::int64_t> integers;
-
-    auto operator()(const fragment<>& f) const {
-        return make(f, std::make_index_sequence<Fours>{}, std::make_index_sequence<Integers>{});
-    }
-
-private:
-    template <std::size_t... F, std::size_t... I>
-    auto make(const fragment<>& f, std::index_sequence<F...>, std::index_sequence<I...>) const {
-        return outputs(glm::vec4(at(f, 4 * F), at(f, 4 * F + 1), at(f, 4 * F + 2), at(f, 4 * F + 3))...,
-                       integer(f, I)...);
-    }
-    [[nodiscard]] float at(const fragment<>& f, std::size_t column) const {
-        if (column < floats.num_of_vertices) {
-            const glm::uvec3 t = triangles[f.primitive];
-            const auto of = [&](std::uint32_t v) { return floats.of_vertices[v * floats.num_of_vertices + column]; };
-            return core::member_traits<float>::mix(of(t.x), of(t.y), of(t.z), f.barycentric.y, f.barycentric.z);
-        }
-        column -= floats.num_of_vertices;
-        if (column >= floats.num_of_triangles) return 0.0F;
-        return floats.of_triangles[f.primitive * floats.num_of_triangles + column];
-    }
-    [[nodiscard]] std::int64_t integer(const fragment<>& f, std::size_t column) const {
-        if (column < integers.num_of_vertices)
-            return integers.of_vertices[triangles[f.primitive].x * integers.num_of_vertices + column];
-        column -= integers.num_of_vertices;
-        if (column >= integers.num_of_triangles) return 0;
-        return integers.of_triangles[f.primitive * integers.num_of_triangles + column];
-    }
-};
+value_columns<T> columns_of(const value_array<T>& vertices, const value_array<T>& triangles) {
+    return {vertices.data(), triangles.data(), vertices.shape(1), triangles.shape(1)};
+}
 
 // Surfaces with the values of column_shader.
 template <class Fours, class Integers>
@@ -183,23 +123,12 @@ nb::tuple remesh_parts(const position_array& positions, const triangle_array& tr
                        const value_array<float>& vertex_floats, const value_array<float>& triangle_floats,
                        const value_array<std::int64_t>& vertex_integers,
                        const value_array<std::int64_t>& triangle_integers, unsigned threads) {
-    const solid_options solid = solid_options_named(sign, "outer", repair_name, bodies_name, max_hole_edges, closing);
-    remesh_options options;
-    options.place = place_named(place_name);
-    options.rule = solid.rule;
-    options.bodies = solid.bodies;
-    options.repair = solid.repair;
-    options.closing = solid.closing;
-    options.max_hole_edges = solid.max_hole_edges;
-    options.level = level;
-    options.sample = corners ? sample::corner : sample::centre;
-    options.border = open ? border::open : border::closed;
-    options.quads = quads;
-    options.min_component = min_component;
-    options.embedded = embedded;
+    const remesh_options options =
+        remesh_options_named(sign, repair_name, bodies_name, max_hole_edges, closing, place_name, level, corners, open,
+                             quads, min_component, embedded);
     const mesh_view<> mesh = view_of(positions, triangles);
-    const value_columns<float> floats(vertex_floats, triangle_floats);
-    const value_columns<std::int64_t> integers(vertex_integers, triangle_integers);
+    const value_columns<float> floats = columns_of(vertex_floats, triangle_floats);
+    const value_columns<std::int64_t> integers = columns_of(vertex_integers, triangle_integers);
     const auto run = [&]<std::size_t Fours, std::size_t Integers>() -> nb::tuple {
         using columns = column_surface<std::make_index_sequence<Fours>, std::make_index_sequence<Integers>>;
         using shader = column_shader<Fours, Integers>;
@@ -226,11 +155,6 @@ nb::tuple remesh_parts(const position_array& positions, const triangle_array& tr
                               nb::none(), nb::none());
     if (integers.count() == 0 && floats.count() <= 4) return run.template operator()<1, 0>();
     return run.template operator()<4, 4>();
-}
-
-extract_options extract_options_named(const std::string& place_name, double level, bool open, bool quads,
-                                      std::uint32_t min_component, bool embedded) {
-    return {place_named(place_name), level, open ? border::open : border::closed, quads, min_component, embedded};
 }
 
 // (nz, ny, nx) bytes that are 0 or not.

@@ -11,6 +11,7 @@
 
 #include <nanobind/nanobind.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 #include <new>
@@ -19,6 +20,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace voxelpipe::python {
 
@@ -66,6 +68,20 @@ template <class T>
         text += (text.empty() ? "'" : ", '") + std::string(choice) + "'";
     }
     throw nb::value_error((std::string(what) + " is one of " + text + ", not '" + std::string(name) + "'").c_str());
+}
+
+// Throws ValueError unless an array has the shape that is wanted, which is a grid's. `what` names the argument.
+inline void expect_shape(const std::vector<std::size_t>& found, const std::vector<std::size_t>& wanted,
+                         const char* what) {
+    if (found == wanted) return;
+    const auto text = [](const std::vector<std::size_t>& shape) {
+        std::string t;
+        for (const std::size_t n : shape) t += (t.empty() ? "(" : ", ") + std::to_string(n);
+        return t + ')';
+    };
+    throw nb::value_error(
+        (std::string(what) + " has the shape " + text(found) + ", the grid's is " + text(wanted) + " (nz, ny, nx)")
+            .c_str());
 }
 
 // The options of a solid from their names, as voxelpipe/_solid.py has them. Throws ValueError.

@@ -144,6 +144,10 @@ def concatenate(arrays):
     return ndarray(np.concatenate([a._a for a in arrays]))
 
 
+def stack(arrays, axis=0):
+    return ndarray(np.stack([a._a for a in arrays], axis))
+
+
 class cuda:  # noqa: N801
     class runtime:  # noqa: N801
         @staticmethod

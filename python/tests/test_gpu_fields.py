@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""Distances and fractions of meshes in a GPU's memory have the bits of the CPU's. Needs a GPU,
+"""Distances, fractions, surfaces and labels of arrays in a GPU's memory have the bits of the CPU's. Needs a GPU,
 voxelpipe-cuda13, and torch or CuPy; without them a stand-in tests what lies between the functions and the GPU's module."""
 
 import warnings
@@ -128,6 +128,7 @@ def test_positions_in_double_keep_their_precision(gpu):
     mesh = put(gpu, far)
     compare(gpu, vp.distance, mesh, far, grid)
     compare(gpu, vp.fractions, mesh, far, grid)
+    compare(gpu, vp.remesh, mesh, far, grid)
     points = POINTS + 4.7e6
     same(gpu, vp.distance_at(mesh, gpu.put(points)), vp.distance_at(far, points))
 
@@ -153,12 +154,93 @@ def test_fractions_of_an_open_mesh(gpu, repair):
     compare(gpu, vp.fractions, put(gpu, empty), empty, GRID, of=ALL, **repair)
 
 
+# ---- surfaces ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"place": "mean", "quads": True}, {"place": "corner", "corners": True}, {"level": 0.07}, {"level": -0.05, "corners": True},
+     {"sign": "even_odd", "bodies": "each", "border": "open"}, {"repair": "exterior"}, {"repair": "vote", "embedded": True},
+     {"repair": "winding", "min_component": 30}],
+    ids=str,
+)  # fmt: skip
+def test_remeshes(gpu, options):
+    for mesh in (PARTS, OPEN):
+        counts = compare(gpu, vp.remesh, put(gpu, mesh), mesh, GRID, **options)
+        assert counts["components"] >= 1
+    if options.get("repair") != "exterior":  # which follows from the whole grid
+        crop = GRID.crop((2, 3, 4), (11, 12, 13))
+        compare(gpu, vp.remesh, put(gpu, MESH), MESH, crop, **options)
+    empty = (MESH[0], MESH[1][:0])
+    compare(gpu, vp.remesh, put(gpu, empty), empty, GRID, **options)
+
+
+@pytest.mark.parametrize("level", [0, 0.1])
+@pytest.mark.parametrize("names", [["three"], ["rgb", "id"], ["three", "twenty", "rgb", "id", "long", "flat"]], ids=str)
+def test_attributes_of_remeshes(gpu, names, level):
+    rng = np.random.default_rng(11)
+    vertices, triangles = len(MESH[0]), len(MESH[1])
+    values = {
+        "three": rng.normal(size=(vertices, 3)).astype(np.float32),
+        "twenty": rng.normal(size=(vertices, 20)),
+        "rgb": rng.integers(0, 256, (vertices, 3), dtype=np.uint8),
+        "id": rng.integers(0, 5, triangles, dtype=np.int32),
+        "long": rng.integers(-(1 << 60), 1 << 60, (vertices, 6), dtype=np.int64),
+        "flat": rng.normal(size=triangles).astype(np.float32),
+    }
+
+    def f(m, **options):
+        chosen = {name: values[name] if m is MESH else gpu.put(values[name]) for name in names}
+        return vp.remesh(m, GRID, attributes=chosen, **options)
+
+    compare(gpu, f, put(gpu, MESH), MESH, level=level)
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"place": "corner", "quads": True}, {"border": "open", "min_component": 20}, {"embedded": True}], ids=str
+)
+def test_extracts(gpu, options):
+    rng = np.random.default_rng(2)
+    bits = rng.random(GRID.shape) < 0.3
+    compare(gpu, vp.extract, gpu.put(bits), bits, GRID, **options)
+    strided = np.asfortranarray(bits)
+    compare(gpu, vp.extract, gpu.put(strided), strided, GRID, **options)
+    at_corners = rng.normal(size=[n + 1 for n in GRID.shape]).astype(np.float32)
+    at_corners[3, 4, 5] = np.nan
+    compare(gpu, vp.extract, gpu.put(at_corners), at_corners, GRID, corners=True, level=0.2, **options)
+    for dtype in (np.float16, np.float32, np.float64):
+        field = rng.normal(size=GRID.shape).astype(dtype)
+        compare(gpu, vp.extract, gpu.put(field), field, GRID, level=-0.1, **options)
+    tiny = np.where(bits, 1.0 - 2.0**-53, 1.0)  # what float32 does not tell from the level
+    counts = compare(gpu, vp.extract, gpu.put(tiny), tiny, GRID, level=1.0, **options)
+    assert counts["components"] > 0
+    nothing = np.zeros(GRID.shape, bool)
+    compare(gpu, vp.extract, gpu.put(nothing), nothing, GRID, **options)
+
+
+# ---- labels -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("connectivity", [6, 18, 26])
+def test_labels(gpu, connectivity):
+    rng = np.random.default_rng(4)
+    for values in (
+        rng.random((5, 7, 70)) < 0.3,
+        np.asfortranarray(rng.random((9, 4, 33)) < 0.5),
+        rng.integers(-1, 2, (3, 4, 5)),
+        rng.integers(0, 2, (1, 1, 1), dtype=np.uint8),
+        np.zeros((2, 3, 4), bool),
+    ):
+        for components in (False, True):
+            compare(gpu, vp.label, gpu.put(values), values, connectivity, components=components)
+
+
 # ---- mistakes ---------------------------------------------------------------------------------------------------------
 
 
 def test_mistakes_are_told_as_on_the_cpu(gpu):
     """Errors of options and shapes are the CPU's, to the letter."""
-    mesh = put(gpu, MESH)
+    mesh, bits = put(gpu, MESH), np.ones((3, 4, 5), bool)
     for f, on_device, on_host in (
         (lambda m: vp.distance(m, GRID, sign="unsigned", repair="vote"), mesh, MESH),
         (lambda m: vp.distance(m, GRID, "even_odd", repair="winding"), mesh, MESH),
@@ -168,6 +250,17 @@ def test_mistakes_are_told_as_on_the_cpu(gpu):
         (lambda m: vp.distance_at(m, m[0], GRID, repair="vote"), mesh, MESH),
         (lambda m: vp.distance_at(m, m[0][:, :2], GRID), mesh, MESH),
         (lambda m: vp.fractions(m, GRID, of="volume"), mesh, MESH),
+        (lambda m: vp.remesh(m, GRID, "even_odd", repair="vote"), mesh, MESH),
+        (lambda m: vp.remesh(m, GRID, level=float("nan")), mesh, MESH),
+        (lambda m: vp.remesh(m, GRID, attributes={"sheet": m[0]}), mesh, MESH),
+        (lambda m: vp.remesh(m, GRID, attributes={"a": m[0][:5]}), mesh, MESH),
+        (lambda a: vp.extract(a, GRID), gpu.put(bits), bits),
+        (lambda a: vp.extract(a, GRID, level=1), gpu.put(bits), bits),
+        (lambda a: vp.label(a, 7), gpu.put(bits), bits),
+        (lambda a: vp.label(a[0]), gpu.put(bits), bits),
+        (lambda a: vp.label(a), gpu.put(bits[:0]), bits[:0]),
+        (lambda a: vp.label(a), gpu.put(POINTS), POINTS),
+        (lambda a: vp.extract(a, GRID), gpu.put(bits.astype(np.int32)), bits.astype(np.int32)),
     ):
         assert message_of(lambda: f(on_device)) == message_of(lambda: f(on_host))
 
@@ -181,6 +274,8 @@ def test_triangles_without_vertices_are_named(gpu):
             lambda: vp.distance(mesh, GRID),
             lambda: vp.distance_at(mesh, gpu.put(POINTS), GRID),
             lambda: vp.fractions(mesh, GRID),
+            lambda: vp.remesh(mesh, GRID),
+            lambda: vp.remesh(mesh, GRID, level=0.1),
         ):
             with pytest.raises(IndexError, match="triangle 6"):
                 f()
@@ -194,6 +289,10 @@ def test_what_a_gpu_does_not_do_is_said(gpu):
         vp.fraction_lists(mesh, GRID)
     with pytest.raises(TypeError, match="links are computed on the CPU"):
         vp.links(mesh, GRID)
+    voxels = gpu.put(np.array([[1, 2, 3]], np.int32))
+    for given in (voxels, (voxels, {}), (voxels, gpu.put(np.zeros((0, 4), np.int32)))):
+        with pytest.raises(TypeError, match="lists of voxels are extracted on the CPU"):
+            vp.extract(given, GRID)
 
 
 def test_arrays_of_one_call_lie_in_one_place(gpu):
@@ -202,6 +301,10 @@ def test_arrays_of_one_call_lie_in_one_place(gpu):
         vp.distance_at(mesh, POINTS)
     with pytest.raises(TypeError, match="points"):
         vp.distance_at(MESH, gpu.put(POINTS))
+    with pytest.raises(TypeError, match="mesh"):
+        vp.remesh(mesh, GRID, attributes={"a": MESH[0]})
+    with pytest.raises(TypeError, match="mesh"):
+        vp.remesh(MESH, GRID, attributes={"a": gpu.put(MESH[0])})
 
 
 def test_without_the_package_the_error_names_it(monkeypatch):
@@ -209,8 +312,10 @@ def test_without_the_package_the_error_names_it(monkeypatch):
 
     gpu = StandIn(monkeypatch)
     monkeypatch.setitem(sys.modules, "voxelpipe_cuda", None)
-    with pytest.raises(TypeError, match="voxelpipe-cuda13"):
-        vp.distance(put(gpu, MESH), GRID)
+    mesh, bits = put(gpu, MESH), gpu.put(np.ones(GRID.shape, bool))
+    for f in (lambda: vp.distance(mesh, GRID), lambda: vp.extract(bits, GRID), lambda: vp.label(bits)):
+        with pytest.raises(TypeError, match="voxelpipe-cuda13"):
+            f()
 
 
 def test_the_current_stream_is_used():
@@ -221,4 +326,6 @@ def test_the_current_stream_is_used():
         v = gpu.put(np.zeros_like(MESH[0]))
         v.copy_(gpu.put(MESH[0]), non_blocking=True)
         drawn = vp.distance((v, gpu.put(MESH[1])), GRID)
+        surface = vp.remesh((v, gpu.put(MESH[1])), GRID)[0]
     same(gpu, drawn, expected)
+    same(gpu, surface, vp.remesh(MESH, GRID)[0])

@@ -19,12 +19,12 @@ from ._arrays import is_on_device
 from ._core import Grid
 
 
-def _module() -> Any:
+def _module(what: str = "the mesh is") -> Any:
     try:
         import voxelpipe_cuda
     except ImportError as e:
         raise TypeError(
-            "the mesh is in a GPU's memory: install voxelpipe-cuda13 to work on it there, or copy it to the host, as with "
+            f"{what} in a GPU's memory: install voxelpipe-cuda13 to work on it there, or copy it to the host, as with "
             f".cpu() or .get() ({e})"
         ) from None
     return voxelpipe_cuda._cuda
@@ -35,6 +35,7 @@ class _Torch:
 
     word = np.int32  # of packed bits: torch can do next to nothing with uint32
     index = np.int64  # of numbers of triangles, by which all versions index
+    face = np.int64  # of the vertices' numbers in a surface
 
     def __init__(self, like: Any) -> None:
         import torch
@@ -82,6 +83,9 @@ class _Torch:
     def concatenate(self, arrays: Sequence[Any]) -> Any:
         return self.torch.cat(list(arrays))
 
+    def columns(self, arrays: Sequence[Any]) -> Any:
+        return self.torch.stack(list(arrays), dim=1)
+
     def pointer(self, a: Any) -> int:
         return int(a.data_ptr())
 
@@ -95,6 +99,7 @@ class _Cupy:
 
     word = np.uint32
     index = np.int32
+    face = np.uint32
 
     def __init__(self, like: Any) -> None:
         import cupy
@@ -152,6 +157,10 @@ class _Cupy:
         with self.device:
             return self.cupy.concatenate(list(arrays))
 
+    def columns(self, arrays: Sequence[Any]) -> Any:
+        with self.device:
+            return self.cupy.stack(list(arrays), axis=1)
+
     def pointer(self, a: Any) -> int:
         return int(a.data.ptr)
 
@@ -204,6 +213,9 @@ class DeviceMesh:
     def bounds(self) -> tuple[list[float], list[float]] | None:
         finite = self.library.finite_rows(self.vertices)
         return self.library.bounds(finite) if len(finite) else None
+
+    def columns(self, arrays: Sequence[Any]) -> Any:
+        return self.library.columns(arrays)
 
     def addresses(self, *arrays: Any) -> list[int]:
         """Where arrays begin; 0 for None."""

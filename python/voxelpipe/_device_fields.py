@@ -1,15 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The VoxelPipe authors
 # SPDX-License-Identifier: Apache-2.0
-"""Distances and fractions of meshes in a GPU's memory, as _device has what draws."""
+"""Distances, fractions, surfaces and labels of meshes and arrays in a GPU's memory, as _device has what draws."""
 
 from __future__ import annotations
 
+import math
 from typing import Any, Sequence
 
 import numpy as np
 
 from ._core import Grid
-from ._device import DeviceMesh, _module
+from ._device import DeviceMesh, _library_of, _module
 
 
 def distance(m: DeviceMesh, grid: Grid, options: Sequence[Any], out: Any, nearest: Any) -> dict[str, int]:
@@ -52,3 +53,95 @@ def fractions(
         stream, positions, triangles, state, axis, *options, out, tuple(others[:3]), tuple(others[3:])
     )
     return counts
+
+
+def _arrays_of(lib: Any, kept: Any, floats: int, integers: int) -> tuple[Any, Any, Any]:
+    """What _core.remesh gives, of a surface that is kept on the device, with so many columns of values."""
+    counts = kept.counts  # raises what went wrong
+    n = kept.num_vertices
+    arrays = [
+        lib.empty((n, 3), np.float64),
+        lib.empty((kept.num_faces, kept.num_corners), lib.face),
+        lib.empty((n, 3), np.int32),
+        lib.empty((n,), np.uint8),
+        lib.empty((n,), np.int64),
+    ]
+    rows, whole = lib.empty((n, floats), np.float32), lib.empty((n, integers), np.int64)
+    kept.copy(
+        tuple(lib.pointer(a) for a in arrays),
+        lib.face == np.int64,
+        (lib.pointer(rows), floats),
+        (lib.pointer(whole), integers),
+    )
+    return (*arrays, counts), rows, whole
+
+
+def remesh(m: DeviceMesh, grid: Grid, corners: bool, options: Sequence[Any], arrays: Sequence[Any]) -> tuple[Any, Any, Any]:
+    """As _core.remesh. options: its arguments from `sign` on without `corners`. arrays: floats of vertices and of triangles,
+    integers of both."""
+    stream, positions, triangles, state, _positions = m.call(grid)
+    columns = [(m.library.pointer(a), a.shape[1]) for a in arrays]
+    kept = _module().remesh(
+        stream,
+        positions,
+        triangles,
+        list(m.first_triangles),
+        state,
+        grid.__getstate__(),
+        corners,
+        *options,
+        tuple(columns[:2]),
+        tuple(columns[2:]),
+    )
+    return _arrays_of(m.library, kept, columns[0][1] + columns[1][1], columns[2][1] + columns[3][1])
+
+
+def extract(values: Any, grid: Grid, corners: bool, place: str, level: float, options: Sequence[Any]) -> Any:
+    """The arrays of _core.extract_bits or extract_field. values: bool or floats of a library's own; options: whether the
+    border is open, quads, min_component, embedded."""
+    module = _module("the array is")
+    lib = _library_of(values)
+    a = lib.take(values, "the array")
+    how = (lib.stream(),)
+    where = (tuple(a.shape), grid.__getstate__(), corners, place)
+    if lib.dtype_of(a) == np.bool_:
+        held = lib.convert(a, np.bool_)
+        kept = module.extract_bits(*how, lib.pointer(held), *where, *options)
+    else:
+        held = lib.convert(a, np.float32)
+        if lib.dtype_of(a).itemsize > 4:  # as _remesh._as_field
+            above = a - level
+            held = lib.convert(above, np.float32)
+            held[(above < 0) & (held == 0)] = -float(np.finfo(np.float32).tiny)
+            level = 0.0
+        kept = module.extract_field(*how, lib.pointer(held), *where, level, *options)
+    return _arrays_of(lib, kept, 0, 0)[0]
+
+
+def label(values: Any, connectivity: int, components: bool) -> tuple[Any, int, dict[str, Any]]:
+    """Labels, the number of components, and their list where it is asked for. values: bool (nz, ny, nx)."""
+    module = _module("the array is")
+    lib = _library_of(values)
+    held = lib.convert(values, np.bool_)
+    shape = tuple(held.shape)
+    is_wide = math.prod(shape) > 2**31
+    labels = lib.empty(shape, np.int64 if is_wide else np.int32)
+    kept = module.label(lib.stream(), lib.pointer(held), shape, connectivity, components, lib.pointer(labels), is_wide)
+    n = kept.count
+    if not components:
+        return labels, n, {}
+    listed = {
+        "name": lib.empty((n,), np.int64),
+        "voxels": lib.empty((n,), np.int64),
+        "min": lib.empty((n, 3), np.int32),
+        "max": lib.empty((n, 3), np.int32),
+    }
+    kept.copy(*(lib.pointer(a) for a in listed.values()))
+    return labels, n, listed
+
+
+def taken(a: Any, what: str) -> tuple[Any, np.dtype]:
+    """An array in a GPU's memory as its library's own, and its type."""
+    lib = _library_of(a)
+    own = lib.take(a, what)
+    return own, lib.dtype_of(own)

@@ -45,6 +45,9 @@ class Mesh:
     def zeros(self, shape: Sequence[int], dtype: Any) -> np.ndarray:
         return np.zeros(shape, dtype)
 
+    def columns(self, arrays: Sequence[np.ndarray]) -> np.ndarray:
+        return np.stack(arrays, axis=1)
+
     def bounds(self) -> tuple[list[float], list[float]] | None:
         """The lowest and highest corner of the vertices that are finite, if there are any."""
         finite = np.isfinite(self.vertices).all(axis=1)

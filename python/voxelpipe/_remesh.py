@@ -6,12 +6,13 @@ from typing import Any, Mapping
 
 import numpy as np
 
-from . import _core
-from ._arrays import to_numpy
+from . import _core, _device_fields
+from ._arrays import is_on_device, to_numpy
 from ._axes import as_voxels
 from ._bake import _attributes, _Attribute
 from ._core import Grid
-from ._distance import _warn_of_holes, host_mesh
+from ._device import DeviceMesh
+from ._distance import _warn_of_holes, mesh_of_triangles
 from ._solid import refuse_grid_within
 from ._surface import take_counts
 from ._types import (
@@ -35,9 +36,11 @@ def _check_numbers(level: float, min_component: int) -> None:
     whole_number("min_component", min_component, 0, "a number of vertices, 0 or more")
 
 
-def _faces_for(to_caller: Any, faces: np.ndarray) -> Any:
-    made = to_caller(faces)
-    return made if isinstance(made, np.ndarray) else to_caller(faces.astype(np.int64))
+def _faces_for(m: Any, faces: Any) -> Any:
+    if isinstance(m, DeviceMesh):
+        return faces
+    made = m.to_caller(faces)
+    return made if isinstance(made, np.ndarray) else m.to_caller(faces.astype(np.int64))
 
 
 _MOST = (16, 4)  # columns of floats and of integers that one run takes
@@ -57,14 +60,14 @@ def _runs(attributes: list[_Attribute]) -> list[list[tuple[int, int]]]:
     return runs
 
 
-def _columns(m: Any, attributes: list[_Attribute], run: list[tuple[int, int]]) -> tuple[list[np.ndarray], list[tuple[int, int]]]:
+def _columns(m: Any, attributes: list[_Attribute], run: list[tuple[int, int]]) -> tuple[list[Any], list[tuple[int, int]]]:
     """What _core.remesh takes: floats of vertices and of triangles, integers of both; and the columns in that order."""
     arrays, order = [], []
     for is_integer in (False, True):
         for per_triangle in (False, True):
             chosen = [(i, c) for i, c in run if (attributes[i].is_integer, attributes[i].per_triangle) == (is_integer, per_triangle)]
             rows = len(m.triangles) if per_triangle else len(m.vertices)
-            values = np.empty((rows, len(chosen)), np.int64 if is_integer else np.float32)
+            values = m.empty((rows, len(chosen)), np.int64 if is_integer else np.float32)
             for k, (i, c) in enumerate(chosen):
                 values[:, k] = attributes[i].values[:, c]
             arrays.append(values)
@@ -124,9 +127,9 @@ def remesh(
     Returns vertices, float64 (n, 3), in world units; faces, uint32 (m, 3), int64 for torch, counter-clockwise seen from
     outside; and a dict with `cell` (n, 3), the index (x, y, z) of the lowest sample of each vertex's cell, `sheet` (n), and
     `source` (n), a triangle that it comes from, -1 for none; and the attributes by name, (n) or (n, columns), of the type
-    that bake() gives. Warns with OpenMeshWarning where rows of samples prove that
-    the mesh is not closed. Raises ValueError for a level that is not finite, IndexError for a triangle that names a vertex
-    that does not exist, TypeError for a mesh in a GPU's memory.
+    that bake() gives. A mesh in a GPU's memory is remeshed there, with the same bits. Warns with OpenMeshWarning where rows
+    of samples prove that the mesh is not closed. Raises ValueError for a level that is not finite, IndexError for a triangle
+    that names a vertex that does not exist.
 
     Example:
         >>> vertices, faces, more = vp.remesh(mesh, grid, repair="close_holes")
@@ -143,37 +146,26 @@ def remesh(
         check_choice(what, value, choices)
     _check_numbers(level, min_component)
     check_solid_numbers(max_hole_edges, closing)
-    m = host_mesh(mesh, "remeshes")
+    m = mesh_of_triangles(mesh, "remeshes")
     taken = [name for name in attributes or {} if name in ("cell", "sheet", "source")]
     if taken:
         raise ValueError(f"{taken[0]!r} is a result of remesh() by itself; give the attribute another name")
     given = _attributes(m, attributes or {}, None, per)
-    positions, where = m.positions(grid)
-    columns: dict[tuple[int, int], np.ndarray] = {}
+    corners = bool(corners)
+    inside = (sign, repair, bodies, max_hole_edges, closing, place, float(level))
+    shape = (border == "open", bool(quads), min_component, bool(embedded))
+    columns: dict[tuple[int, int], Any] = {}
     made: Any = None
     for run in _runs(given):
         arrays, order = _columns(m, given, run)
-        surface, floats, integers = _core.remesh(
-            positions,
-            m.triangles,
-            list(m.first_triangles),
-            where,
-            _core.at_corners(grid) if corners else grid,
-            sign,
-            repair,
-            bodies,
-            max_hole_edges,
-            closing,
-            place,
-            float(level),
-            bool(corners),
-            border == "open",
-            bool(quads),
-            min_component,
-            bool(embedded),
-            *arrays,
-            threads,
-        )
+        if isinstance(m, DeviceMesh):
+            surface, floats, integers = _device_fields.remesh(m, grid, corners, inside + shape, arrays)
+        else:
+            positions, where = m.positions(grid)
+            world = _core.at_corners(grid) if corners else grid
+            surface, floats, integers = _core.remesh(
+                positions, m.triangles, list(m.first_triangles), where, world, *inside, corners, *shape, *arrays, threads
+            )
         made = surface if made is None else made
         num_floats = arrays[0].shape[1] + arrays[1].shape[1]
         for k, column in enumerate(order):
@@ -188,8 +180,8 @@ def remesh(
         source = np.full(len(vertices), -1, np.int64)
     more = {"cell": cell, "sheet": sheet, "source": source}
     for i, a in enumerate(given):
-        more[a.name] = a.typed(m, np.stack([columns[i, c] for c in range(a.values.shape[1])], axis=1))
-    return m.to_caller(vertices), _faces_for(m.to_caller, faces), {k: m.to_caller(v) for k, v in more.items()}
+        more[a.name] = a.typed(m, m.columns([columns[i, c] for c in range(a.values.shape[1])]))
+    return m.to_caller(vertices), _faces_for(m, faces), {k: m.to_caller(v) for k, v in more.items()}
 
 
 def _as_cubes(cubes: Any) -> np.ndarray:
@@ -218,6 +210,21 @@ def _as_field(array: np.ndarray, level: float) -> tuple[np.ndarray, float]:
     return field, 0.0
 
 
+def _kind_of(dtype: np.dtype, ndim: int, is_pair: bool, level: float) -> str:
+    """"lists of voxels", "bool values" or "floats". Raises ValueError for a level of what has none, TypeError for others."""
+    if is_pair or (ndim == 2 and dtype.kind in "iu"):
+        kind = "lists of voxels"
+    elif dtype == np.bool_:
+        kind = "bool values"
+    elif dtype.kind == "f":
+        return "floats"
+    else:
+        raise TypeError(f"values are bool, which voxels are inside, floats, or lists of voxels (n, 3), not {dtype}")
+    if level != 0:
+        raise ValueError(f"{kind} have no level")
+    return kind
+
+
 def extract(
     values: Any,
     grid: Grid,
@@ -237,7 +244,8 @@ def extract(
     Args:
         values: bool (nz, ny, nx): the voxels that are inside. Or floats, such as those of distance(): what is below
             `level` is inside; NaN is outside. Or lists of what is inside, whose memory is that of the surface: voxels (n, 3),
-            as a VoxelList, the result of sparse() or that of tiles().
+            as a VoxelList, the result of sparse() or that of tiles(). Dense arrays in a GPU's memory stay there; lists are of
+            the host.
         grid: the grid of the values; a value lies at the centre of its voxel, unless `corners` is given.
         place: where vertices lie in their cells: "mean" at the mean of the cell's crossings, "corner" at the corners of
             voxels. "sharp" has no planes here, and is "mean".
@@ -257,31 +265,32 @@ def extract(
     check_choice("place", place, Place)
     check_choice("border", border, Border)
     _check_numbers(level, min_component)
-    if corners:
-        grid = _core.at_corners(grid)
     is_pair = isinstance(values, tuple) and len(values) == 2
-    array = np.asarray(values[0] if is_pair else values)
-    if is_pair or (array.ndim == 2 and np.issubdtype(array.dtype, np.integer)):
-        if level != 0:
-            raise ValueError("lists of voxels have no level")
-        cubes = np.empty((0, 4), np.int32)
-        if is_pair and not isinstance(values[1], Mapping):
-            cubes = _as_cubes(values[1])
-        made = _core.extract_list(
-            as_voxels(array), cubes, grid, place, border == "open", bool(quads), min_component, bool(embedded), threads
-        )
-    elif array.dtype == np.bool_:
-        if level != 0:
-            raise ValueError("bool values have no level")
-        inside = np.ascontiguousarray(array).view(np.uint8)
-        made = _core.extract_bits(inside, grid, place, border == "open", bool(quads), min_component, bool(embedded), threads)
-    elif np.issubdtype(array.dtype, np.floating):
-        field, level = _as_field(array, float(level))
-        made = _core.extract_field(
-            field, grid, place, level, border == "open", bool(quads), min_component, bool(embedded), threads
-        )
+    first = values[0] if is_pair else values
+    options = (border == "open", bool(quads), min_component, bool(embedded))
+    if is_on_device(first):
+        there, dtype = _device_fields.taken(first, "the array")
+        if _kind_of(dtype, there.ndim, is_pair, level) == "lists of voxels":
+            raise TypeError("lists of voxels are extracted on the CPU: copy them to the host, as with .cpu() or .get()")
+        made = _device_fields.extract(there, grid, bool(corners), place, float(level), options)
     else:
-        raise TypeError(f"values are bool, which voxels are inside, floats, or lists of voxels (n, 3), not {array.dtype}")
-    vertices, faces, cell, sheet, _, counts = made
+        if corners:
+            grid = _core.at_corners(grid)
+        array = np.asarray(first)
+        kind = _kind_of(array.dtype, array.ndim, is_pair, level)
+        if kind == "lists of voxels":
+            cubes = np.empty((0, 4), np.int32)
+            if is_pair and not isinstance(values[1], Mapping):
+                cubes = _as_cubes(values[1])
+            made = _core.extract_list(as_voxels(array), cubes, grid, place, *options, threads)
+        elif kind == "bool values":
+            inside = np.ascontiguousarray(array).view(np.uint8)
+            made = _core.extract_bits(inside, grid, place, *options, threads)
+        else:
+            field, level = _as_field(array, float(level))
+            made = _core.extract_field(field, grid, place, level, *options, threads)
+    vertices, faces, cell, sheet, source, counts = made
     take_counts(counts, status)
-    return vertices, faces, {"cell": cell, "sheet": sheet, "source": np.full(len(vertices), -1, np.int64)}
+    if len(source) != len(vertices):
+        source = np.full(len(vertices), -1, np.int64)
+    return vertices, faces, {"cell": cell, "sheet": sheet, "source": source}

@@ -58,5 +58,6 @@ template <class F>
 }
 
 void bind_fields(nb::module_& m);
+void bind_surfaces(nb::module_& m);
 
 } // namespace voxelpipe::python

@@ -165,4 +165,5 @@ NB_MODULE(_cuda, m) {
     voxelpipe::python::bind_dense(m);
     voxelpipe::python::bind_lists(m);
     voxelpipe::python::bind_fields(m);
+    voxelpipe::python::bind_surfaces(m);
 }

@@ -29,6 +29,27 @@ void for_each(const device_stream& on, std::size_t n, const F& f) {
 
 inline void wait(const device_stream& on) { check(cudaStreamSynchronize(reinterpret_cast<cudaStream_t>(on.stream))); }
 
+// Bytes (nz, ny, nx) that are 0 or not as words of 32 voxels along x, lowest bit first.
+struct pack_bits {
+    const std::uint8_t* values;
+    std::uint32_t* words;
+    std::size_t row, words_a_row;
+    VOXELPIPE_HD void operator()(std::size_t i) const {
+        const std::size_t first = i % words_a_row * 32, left = row - first;
+        const std::uint8_t* const from = values + i / words_a_row * row + first;
+        std::uint32_t word = 0;
+        for (std::size_t b = 0; b < (left < 32 ? left : 32); ++b) word |= std::uint32_t{from[b] != 0} << b;
+        words[i] = word;
+    }
+};
+inline void pack_bits_of(const device_stream& on, const std::uint8_t* values, const glm::ivec3& extent,
+                         std::uint32_t* words) {
+    const auto row = static_cast<std::size_t>(extent.x);
+    const std::size_t words_a_row = (row + 31) / 32;
+    const std::size_t rows = static_cast<std::size_t>(extent.y) * static_cast<std::size_t>(extent.z);
+    for_each(on, words_a_row * rows, pack_bits{values, words, row, words_a_row});
+}
+
 // Components of a value, a scalar's or a vector's.
 template <class T>
 [[nodiscard]] VOXELPIPE_HD T component_of(const T& value, int) {
