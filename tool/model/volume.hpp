@@ -88,7 +88,8 @@ struct channel {
     int components = 1; // 1..4; always 1 for `bit`
     channel_bytes data;
     // In place of data: writes the values of the voxels from number `first` on, in storage order, as many as `to` has
-    // room for; bits as bytes 0 and 1. Any thread may call it. Only dense_stream.hpp and level_set.hpp read such channels; f16 has none.
+    // room for; bits as bytes 0 and 1. Any thread may call it. Only dense_stream.hpp and level_set.hpp read such
+    // channels; f16 has none.
     std::function<void(std::uint64_t first, std::span<std::byte> to)> read = {};
 };
 
