@@ -178,7 +178,7 @@ TEST(DeviceSurfaces, ValuesHaveTheBytesOfTheCpu) {
               vp::remesh_options{.repair = vp::repair::close_holes}, vp::remesh_options{.level = 0.05}}) {
             const host_values a = remesh_with_values(gpu, m, g, o, {1}), b = remesh_with_values(cpu, m, g, o, {1});
             EXPECT_TRUE(a.mesh.status.ok()) << a.mesh.status.message();
-            EXPECT_GT(a.at.size(), 50u);
+            EXPECT_GT(a.at.size(), 20u);
             EXPECT_TRUE(a.has_same_arrays(b));
         }
     }
