@@ -97,10 +97,10 @@ private:
     scene model_;
     int padding_;
     voxelpipe::grid whole_;
-    voxelize_request request_; // of the slab
+    voxelize_request request_; // for the slab that is drawn, without its padding
     voxelize_stats& stats_;
     vp::cpu_backend on_;
-    std::optional<pipeline<vp::cpu_backend>> drawer_; // of these
+    std::optional<pipeline<vp::cpu_backend>> drawer_; // refers to the four members above
 };
 
 } // namespace
@@ -117,7 +117,9 @@ std::optional<volume> cells_in_slabs(scene& model, const voxelize_request& reque
         voxelize_request part = request;
         part.padding = 0;
         part.grid = request.grid.crop({0, 0, 0}, {extent.x, extent.y, std::min(extent.z, layers)});
-        return dense_need(model, part) + volume_bytes(part) + written; // two slabs are kept
+        // Two slabs are kept, and of one that is drawn also what lies within the padding.
+        const double beside = volume_bytes(part) * (request.padding == 0 ? 1 : 2);
+        return dense_need(model, part) + beside + written;
     };
     const int layers = most_layers(extent.z, step, room, need_of);
     const double need = need_of(layers);

@@ -88,7 +88,7 @@ void look_at(const field_shape& f, const std::byte* distances, const glm::ivec3&
         to.inner.push_back(found.key);
 }
 
-// Calls visit(place in the layer of bricks, number of the voxel) for the band's voxels of some bricks, in order.
+// Calls visit(place in the layer of bricks, number of the voxel) for the band's voxels of a brick, in Morton order.
 template <class Visit>
 void for_each_in_band(const volume& v, const found_brick& b, const Visit& visit) {
     const glm::ivec3 origin = voxelpipe::core::morton_position(b.key) * 8;
@@ -136,7 +136,7 @@ void read_layers(const field_shape& f, const channel& distances, int threads, co
                 layer.bricks.push_back(b);
             }
         }
-        const channel* held = &distances; // that has been read
+        const channel* held = &distances; // the channel whose values are in `read`
         for (const channel& c : v.channels) {
             if (held != &c) read_layer(c, z);
             held = &c;

@@ -182,8 +182,9 @@ std::optional<int> layers_of_slabs(const scene& model, const voxelize_request& r
     const auto need_of = [&](int layers) {
         const voxelize_request part = request_of_layers(request, 0, std::min(extent.z, layers));
         const double drawn = held == 0 ? distance_need(model, part)
-                                       : held + distance_bytes(part).of(static_cast<double>(model.triangle_count()),
-                                                                        static_cast<double>(model.vertex_count()));
+                                       : held + request.write_bytes(0, 0, 0) +
+                                             distance_bytes(part).of(static_cast<double>(model.triangle_count()),
+                                                                     static_cast<double>(model.vertex_count()));
         return drawn + volume_bytes(part);
     };
     std::string what = std::string(distance.is_whole ? "a whole distance field of " : "a distance field of ") +

@@ -66,15 +66,6 @@ public:
                           device::place_states{table_.data(), where, const_cast<cell_place*>(places.data())});
         run([&] { device::place_words(words(), blocks(), places.data(), vertices, backend_.stream); });
     }
-    // The vertices by the crossings of edges, and their sources where primitives are given.
-    void place_crossed(place where, const edge_crossing* crossings, const std::uint32_t* primitives,
-                       surface_vertex* vertices, std::uint32_t* sources) const {
-        if (num_words_ == 0) return;
-        run([&] {
-            device::place_crossed(words(), blocks(), {where, crossings, primitives, vertices, sources},
-                                  backend_.stream);
-        });
-    }
     // As core::for_each_edge.
     template <int Axis, class Use>
     void for_each_edge(const Use& use) const {
