@@ -250,9 +250,11 @@ __global__ __launch_bounds__(words_per_block) void list_faces_kernel(const __gri
                 const std::uint32_t second = v[1];
                 v[1] = v[3];
                 v[3] = second;
-                const place_from second_place = places[1];
-                places[1] = places[3];
-                places[3] = second_place;
+                if constexpr (!MakesQuads) {
+                    const place_from second_place = places[1];
+                    places[1] = places[3];
+                    places[3] = second_place;
+                }
             }
             if constexpr (MakesQuads) {
                 out.quads[first + k + threadIdx.x] = glm::uvec4(v[0], v[1], v[2], v[3]);
