@@ -130,10 +130,13 @@ TEST(WindingTree, ShadowsOfHolesThatStayOpenAreThoseOfRows) {
 TEST(WindingTree, BricksDecideTheirSamplesAsTheWholeSumDoes) {
     splitmix64 random(16);
     using verdict = core::winding_verdict;
-    std::size_t of_kind[6] = {};
-    const open_mesh flat(below(sphere(glm::vec3(32.0f), 28.0f, 4), 34.0f), unit_grid(glm::ivec3(64)));
-    const open_mesh bitten(bitten_sphere(random, 32.0f, 28.0f), unit_grid(glm::ivec3(64)));
-    for (const open_mesh* m : {&flat, &bitten}) {
+    std::size_t of_kind[6] = {}, by_near_holes = 0, by_rows = 0;
+    const vp::grid g = unit_grid(glm::ivec3(64));
+    const mesh whole = sphere(glm::vec3(32.0f), 28.0f, 4);
+    const open_mesh flat(below(whole, 34.0f), g), bitten(bitten_sphere(random, 32.0f, 28.0f), g),
+        pierced(less_triangles(sphere(glm::vec3(24.0f), 18.0f, 4), random, 250), g),
+        both(less_triangles(below(whole, 40.0f), random, 150), g);
+    for (const open_mesh* m : {&flat, &bitten, &pierced, &both}) {
         const core::winding_view view = m->tree.view();
         const core::triple<std::int64_t> extent{{64, 64, 64}};
         std::vector<unsigned> marks(512);
@@ -159,7 +162,16 @@ TEST(WindingTree, BricksDecideTheirSamplesAsTheWholeSumDoes) {
             std::uint32_t near[core::near_holes::most];
             const verdict brick = core::judge_brick(view, samples, middle.k, middle.k_cones,
                                                     marks[static_cast<std::size_t>(i)], rule, near);
-            ++of_kind[brick.kind];
+            const auto& holes = brick.near;
+            if (m == &flat || m == &bitten)
+                ++of_kind[brick.kind];
+            else if (brick.kind == verdict::unknown && holes.count <= core::near_holes::most)
+                ++by_near_holes;
+            const int box = i % 3 == 0 ? core::large_winding_box : core::small_winding_box;
+            const int first[3] = {x0 / box * box, y0 / box * box, z0 / box * box}, extent_of_grid[3] = {64, 64, 64};
+            const bool is_of_rows =
+                core::is_below_half(view, core::winding_samples::of_box(first, box, extent_of_grid, m->g.fraction()));
+            by_rows += is_of_rows ? 1 : 0;
             const bool is_rare = brick.kind != verdict::outside && brick.kind != verdict::inside &&
                                  !(brick.kind == verdict::beyond && brick.whole == 0);
             for (int n = 0; n < (is_rare ? 12 : 2); ++n) {
@@ -167,15 +179,18 @@ TEST(WindingTree, BricksDecideTheirSamplesAsTheWholeSumDoes) {
                 for (int k = 0; k < 3; ++k)
                     q[k] = static_cast<int>(random.below(static_cast<std::uint64_t>(samples.count[k])));
                 const core::winding_sample s = known(q[0], q[1], q[2]);
-                ASSERT_EQ(core::judge_sample(view, samples, brick, near, q[0], q[1], q[2], s, rule),
-                          m->is_inside(samples.at(q[0], q[1], q[2]), s.k, rule))
+                const bool expected = m->is_inside(samples.at(q[0], q[1], q[2]), s.k, rule);
+                ASSERT_EQ(core::judge_sample(view, samples, brick, near, q[0], q[1], q[2], s, rule), expected)
                     << i << " kind " << brick.kind;
+                ASSERT_TRUE(!is_of_rows || core::is_inside(rule, s.k) == expected) << i << " box " << box;
             }
         }
     }
     for (const auto kind : {verdict::outside, verdict::inside, verdict::beyond, verdict::number, verdict::unknown})
         EXPECT_GT(of_kind[kind], 0u) << kind;
     EXPECT_LT(of_kind[verdict::unknown], 512u) << "of 1024";
+    EXPECT_GT(by_near_holes, 300u);
+    EXPECT_GT(by_rows, 100u);
 }
 
 TEST(WindingTree, MarksOfBricksMissNoTriangleAndSamplesOnTrianglesAreAllFound) {

@@ -289,6 +289,29 @@ TEST(Solids, GeneralizedWindingNumbers) {
     whole.expect_same(box_grid({37, 26, 25}), {.repair = vp::repair::winding});
 }
 
+// Boxes of bricks that rows decide, and bricks beside holes of few edges, of many, and of both. Triangles share places
+// and no vertices.
+TEST(Solids, GeneralizedWindingNumbersOfManyHoles) {
+    const auto opened = [](const mesh_data& m, std::size_t every, float below) {
+        mesh_data open = m;
+        open.triangles.clear();
+        for (std::size_t i = 0; i < m.triangles.size(); ++i)
+            if ((every == 0 || (i * 7919) % every != 0) && m.positions[m.triangles[i].x].z < below)
+                open.triangles.push_back(m.triangles[i]);
+        return open;
+    };
+    const mesh_data whole = ball({30.0f, 27.5f, 27.0f}, 24.0f, 24);
+    for (const auto& [every, below] :
+         {std::pair{std::size_t{9}, 1e9f}, {std::size_t{0}, 36.0f}, {std::size_t{9}, 36.0f}}) {
+        SCOPED_TRACE(every);
+        const drawing_of_bits bits{{opened(whole, every, below)}, {{}}, {{true}}};
+        bits.expect_same(box_grid({69, 55, 52}), {.repair = vp::repair::winding});
+    }
+    const drawing_of_bits two{
+        {opened(whole, 11, 1e9f), opened(ball({40.0f, 20.0f, 25.0f}, 14.0f, 14), 0, 27.0f)}, {{}}, {{true}}};
+    two.expect_same(box_grid({69, 55, 52}), {.bodies = vp::bodies::draw, .repair = vp::repair::winding});
+}
+
 // A block takes as many triangles as it has threads, and several blocks share those of a small mesh.
 TEST(Solids, VotesOfMoreTrianglesThanABlockHasThreads) {
     const mesh_data all = tied_bodies(36.0f, 300, 11);

@@ -79,8 +79,9 @@ struct winding_work {
         w.counts = memory.take<winding_counts>(1);
         w.large_boxes = memory.take<std::uint32_t>(winding_boxes{extent, core::large_winding_box}.count());
         w.small_boxes = memory.take<std::uint32_t>(winding_boxes{extent, core::small_winding_box}.count());
-        w.room_bricks = std::max(bricks / 4, std::min<std::uint64_t>(bricks, 4096));
-        w.room_near_holes = w.room_bricks * 64;
+        const std::uint64_t few = std::min<std::uint64_t>(bricks, 4096);
+        w.room_bricks = std::max(bricks / 4, few);
+        w.room_near_holes = std::max(w.room_bricks * 64, few * core::near_holes::most);
         w.room_samples = bricks;
         w.bricks = memory.take<winding_record>(w.room_bricks);
         w.near_holes = memory.take<std::uint32_t>(w.room_near_holes);
