@@ -112,8 +112,9 @@ std::vector<fs::path> commit_all(std::span<const std::unique_ptr<output_file>> f
 
 bool is_standard_output(const fs::path& path) {
     const std::string whole = path.string();
-    return whole.size() > 2 && whole.ends_with(":-") &&
-           std::all_of(whole.begin(), whole.end() - 2, [](unsigned char c) { return std::isalnum(c) != 0; });
+    return whole.size() > 2 && whole.ends_with(":-") && std::isalnum(static_cast<unsigned char>(whole.front())) != 0 &&
+           std::all_of(whole.begin(), whole.end() - 2, // a point as in nii.gz:-
+                       [](unsigned char c) { return std::isalnum(c) != 0 || c == '.'; });
 }
 
 namespace {
