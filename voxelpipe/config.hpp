@@ -87,6 +87,6 @@
 #endif
 #endif
 
-#if !defined(__SIZEOF_INT128__)
-#error "VoxelPipe needs a 64-bit target whose compiler has __int128 (g++, clang or nvcc)"
+#if !defined(__SIZEOF_INT128__) && !defined(_M_X64) && !defined(_M_ARM64)
+#error "VoxelPipe needs a 64-bit target"
 #endif

@@ -38,7 +38,7 @@ class VoxelPipe(ConanFile):
     def validate(self):
         check_min_cppstd(self, 20)
         if self.settings.compiler == "msvc":
-            raise ConanInvalidConfiguration("VoxelPipe needs __int128, which MSVC lacks")
+            raise ConanInvalidConfiguration("No version of VoxelPipe was compiled with MSVC yet")
         if self.settings.arch not in ("x86_64", "armv8"):
             raise ConanInvalidConfiguration("VoxelPipe needs a 64-bit target")
 

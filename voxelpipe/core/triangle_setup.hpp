@@ -11,20 +11,12 @@
 // In a projection the test at voxel (x, y) is three half-planes a*x + b*y + c >= 0, where c already holds the corner of
 // the voxel that lies furthest inside and the division by 2^F: corners are multiples of 2^F, so rounding down is exact.
 
+#include <voxelpipe/core/coverage_rule.hpp>
 #include <voxelpipe/core/fixed_point.hpp>
 
 #include <cstdint>
 
-namespace voxelpipe {
-
-// Which voxels a triangle covers. thin: one voxel per touched column of the dominant axis, 6-separating.
-// conservative: every voxel whose closed box meets the closed triangle, 26-separating. crosshair: every voxel of which
-// the triangle meets an arm, a segment through the centre from face to face along an axis, that is not parallel to it;
-// 6-separating. diagonal: the same with four arms, from corner to corner; 26-separating (core/arms.hpp). Points and
-// lines have no arms to meet: both are conservative coverage there.
-enum class coverage : std::uint8_t { thin, conservative, crosshair, diagonal };
-
-namespace core {
+namespace voxelpipe::core {
 
 // The arms of a voxel that a coverage asks for. Code of conservative coverage leaves out the voxels whose arms the
 // triangle does not meet, so programs compile nothing for them.
@@ -269,5 +261,4 @@ setup_triangle(const snapped_position& a, const snapped_position& b, const snapp
     return t;
 }
 
-} // namespace core
-} // namespace voxelpipe
+} // namespace voxelpipe::core

@@ -11,17 +11,31 @@
 #include <cmath>
 #include <cstdint>
 
-// MinGW's functions round twice; WebAssembly has no instruction, and a function of its C library's choice.
-#if (defined(__MINGW32__) && !defined(__FMA__)) || defined(__wasm__)
+#if defined(_MSC_VER) && !defined(VOXELPIPE_OWN_INT128)
+#define VOXELPIPE_OWN_INT128
+#endif
+#if defined(VOXELPIPE_OWN_INT128)
+#include <voxelpipe/core/int128.hpp>
+#endif
+
+// MinGW's functions round twice; WebAssembly has no instruction, and a function of its C library's choice, as MSVC has.
+#if (defined(__MINGW32__) && !defined(__FMA__)) || defined(__wasm__) || defined(_MSC_VER)
 #define VOXELPIPE_SOFTWARE_FMA
 #endif
 
 namespace voxelpipe {
 
+// Integers of 128 bits are the compiler's, or ours where it has none. With VOXELPIPE_OWN_INT128 defined they are ours
+// everywhere, for tests of these.
+#if defined(VOXELPIPE_OWN_INT128)
+using int128 = core::wide_integer<true>;
+using uint128 = core::wide_integer<false>;
+#else
 // Integers of 128 bits, in which coverage of large triangles is decided.
 __extension__ typedef __int128 int128;
 // The same without a sign.
 __extension__ typedef unsigned __int128 uint128;
+#endif
 
 namespace exact {
 
@@ -100,7 +114,7 @@ struct integer_and_exponent {
     if (shift >= 0) return value << shift;
     if (shift <= -128) return static_cast<uint128>(value != 0);
     const uint128 shifted = value >> -shift;
-    return shifted | static_cast<uint128>(shifted << -shift != value);
+    return shifted | static_cast<uint128>((shifted << -shift) != value);
 }
 // double: in integers. The greater of product and c takes 126 bits; where the other loses bits, the greater is more
 // than twice as large, so that a difference keeps more bits than the result has.

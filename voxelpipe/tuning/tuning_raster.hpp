@@ -6,7 +6,7 @@
 // classes, queue lengths. Results do not depend on them. Measured on an NVIDIA H200; docs/optimizations.md has the
 // gains. All "blocks" are per multiprocessor, and bound the registers.
 
-#include <voxelpipe/core/triangle_setup.hpp>
+#include <voxelpipe/core/coverage_rule.hpp>
 
 #include <cstddef>
 #include <cstdint>

@@ -102,7 +102,7 @@ public:
         const auto wide = [](int n) { return static_cast<std::uint64_t>(n); };
         keys_of_ = {wide(extent.x) + 2, wide(extent.y), options_.bodies == bodies::call ? 1 : num_draws_};
         const uint128 num_keys = static_cast<uint128>(num_rows()) * keys_of_.bodies * keys_of_.slots;
-        if (num_keys >> 63 != 0) return fail(status_code::size_overflow);
+        if ((num_keys >> 63) != 0) return fail(status_code::size_overflow);
 
         if (finds_edges) scene_.count_open_edges();
         if (!list_terms(triangles)) return fail(status_code::out_of_memory);

@@ -197,7 +197,7 @@ template <class Backend, class Mesh, class VertexShader, class Shader>
     const passes::link_keys keys_of{g.extent, wide(options.neighbours)};
     const uint128 num_keys =
         static_cast<uint128>(wide(g.extent.x)) * wide(g.extent.y) * wide(g.extent.z) * keys_of.neighbours;
-    if (num_keys >> 63 != 0) return fail(status_code::size_overflow);
+    if ((num_keys >> 63) != 0) return fail(status_code::size_overflow);
 
     using words = typename Backend::template buffer<std::uint32_t>;
     using numbers = typename Backend::template buffer<std::uint64_t>;

@@ -15,6 +15,7 @@
 #include <voxelpipe/distance/device/distance_input.cuh>
 
 #include <cstdint>
+#include <limits>
 
 namespace voxelpipe::device {
 
@@ -44,7 +45,10 @@ struct near_triangle {
     float distance; // not less than the point's
     std::uint32_t primitive;
 
-    [[nodiscard]] __device__ static near_triangle none() { return {__builtin_inff(), no_primitive}; }
+    [[nodiscard]] __device__ static near_triangle none() {
+        constexpr float infinity = std::numeric_limits<float>::infinity();
+        return {infinity, no_primitive};
+    }
     __device__ VOXELPIPE_INLINE void take(const near_triangle& other) {
         if (other.distance < distance || (other.distance == distance && other.primitive < primitive)) *this = other;
     }
@@ -66,7 +70,7 @@ struct octant_search {
     float limit;            // Distances beyond it do not matter.
     float best[2];          // bounds of the squares of the lane's samples
     unsigned queued;
-    static constexpr float infinity = __builtin_inff();
+    static constexpr float infinity = std::numeric_limits<float>::infinity();
 
     __device__ octant_search(const distance_input& in_, octant_memory& m_, const glm::ivec3& first_)
         : in(in_), m(m_), first(first_), queued(0) {

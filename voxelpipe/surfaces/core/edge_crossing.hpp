@@ -57,11 +57,11 @@ struct edge_position {
 // Rounded to 2^-24, half up.
 [[nodiscard]] VOXELPIPE_HD inline std::uint32_t round_position(const edge_position& p) {
     constexpr int f = edge_crossing::fraction;
-    if (p.numerator >> (62 - f) == 0 && p.denominator >> 62 == 0) {
+    if ((p.numerator >> (62 - f)) == 0 && (p.denominator >> 62) == 0) {
         const auto n = static_cast<std::uint64_t>(p.numerator), d = static_cast<std::uint64_t>(p.denominator);
         return static_cast<std::uint32_t>(((n << (f + 1)) + d) / (2 * d));
     }
-    if (p.denominator >> 51 == 0) { // the bits of twice the quotient in two parts, which 64 bits can divide
+    if ((p.denominator >> 51) == 0) { // the bits of twice the quotient in two parts, which 64 bits can divide
         constexpr int upper = 12, lower = f + 1 - upper;
         const auto n = static_cast<std::uint64_t>(p.numerator), d = static_cast<std::uint64_t>(p.denominator);
         const std::uint64_t high = (n << upper) / d, rest = (n << upper) - high * d, low = (rest << lower) / d;
