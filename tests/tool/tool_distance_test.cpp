@@ -3,6 +3,7 @@
 // --distance: the field in files, its band, sign and values of the nearest triangle, level sets, and what is refused.
 #include "tool_test.hpp"
 
+#include <voxelpipe/core/half.hpp>
 #include <voxelpipe/sparse/io/nanovdb_layout.hpp>
 
 #include <gtest/gtest.h>
@@ -250,6 +251,46 @@ TEST(Distance, EveryFormatOfValuesHoldsIt) {
     }
 }
 
+// Files of arrays hold the nearest half floats, and all that lies beside them as it is.
+TEST(Distance, HalfFloatsAreTheNearest) {
+    const scratch_folder folder;
+    builder file;
+    add_box(file, low, high);
+    ASSERT_EQ(0, measure(folder, file, "o.npy", {"--band", "whole"}).code);
+    const array floats = read_npy(folder / "o.npy");
+    const outcome result =
+        measure(folder, file, "h.npy", {"--band", "whole", "--half", "-o", folder / "h.png", "-o", folder / "h.vti"});
+    ASSERT_EQ(0, result.code) << result.err;
+    EXPECT_EQ(std::string::npos, result.err.find("65504")) << result.err;
+    const array halves = read_npy(folder / "h.npy");
+    EXPECT_EQ("<f2", halves.type);
+    ASSERT_EQ(floats.shape, halves.shape);
+    int rounded = 0;
+    for (std::size_t i = 0; i < floats.voxels(); ++i) {
+        const voxelpipe::half h = voxelpipe::half::from_bits(halves.at<std::uint16_t>(i));
+        ASSERT_EQ(voxelpipe::half(floats.at<float>(i)), h) << i;
+        rounded += static_cast<float>(h) != floats.at<float>(i) ? 1 : 0;
+    }
+    EXPECT_LT(100, rounded);
+    ASSERT_EQ(0, measure(folder, file, "f.vti", {"--band", "whole", "-o", folder / "f.png"}).code);
+    EXPECT_TRUE(read_file(folder / "f.vti") == read_file(folder / "h.vti"));
+    EXPECT_TRUE(read_file(folder / "f.png") == read_file(folder / "h.png"));
+
+    ASSERT_EQ(0, measure(folder, file, "n.npy", {"--half", "-t", "distance,nearest"}).code);
+    EXPECT_EQ("<f2", read_npy(folder / "n.distance.npy").type);
+    EXPECT_EQ("<i8", read_npy(folder / "n.nearest.npy").type);
+    EXPECT_EQ(0, measure(folder, file, "z.zarr", {"--half"}).code);
+    EXPECT_NE(std::string::npos, read_file(folder / "z.zarr/distance/zarr.json").find("float16"));
+
+    // A sample that is further away than half floats reach is infinite, and a warning says so.
+    const outcome far = run(folder, {folder / "m.glb", "-o", folder / "far.npy", "--distance", "--band", "whole",
+                                     "--half", "--origin", "-1000,-1000,-1000", "-s", "1000", "--extent", "100,2,2"});
+    ASSERT_EQ(0, far.code) << far.err;
+    EXPECT_NE(std::string::npos, far.err.find("distances beyond 65504 are infinite")) << far.err;
+    EXPECT_EQ(0x7c00, read_npy(folder / "far.npy").at<std::uint16_t>(99));
+    EXPECT_NE(0x7c00, read_npy(folder / "far.npy").at<std::uint16_t>(50));
+}
+
 TEST(Distance, NoTriangleIsTheBandAway) {
     const scratch_folder folder;
     builder file;
@@ -283,6 +324,7 @@ TEST(Distance, WhatDoesNotGoTogetherIsRefused) {
     refused({"--corners"}, "--corners goes with --distance");
     refused({"--unsigned"}, "--unsigned goes with --distance");
     refused({"--iso", "1"}, "--iso goes with --distance");
+    refused({"--half"}, "--half goes with --distance");
     refused({"-t", "nearest"}, "nearest goes with --distance");
     refused({"-t", "distance"}, "distance goes with --distance");
     refused({"--distance", "--unsigned", "--solid", "nonzero"}, "--unsigned has no sign");
@@ -295,6 +337,10 @@ TEST(Distance, WhatDoesNotGoTogetherIsRefused) {
     refused({"--distance", "--levels"}, "--levels does not go with --distance");
     refused({"--distance", "--sparse"}, "--sparse does not go with --distance");
     refused({"--distance", "--closing", "2"}, "--closing goes with --solid exterior");
+    const outcome pictures = run(folder, {folder / "m.glb", "-o", folder / "o.png", "-r", "8", "--distance", "--half"});
+    EXPECT_EQ(1, pictures.code);
+    EXPECT_NE(std::string::npos, pictures.err.find(".png has no numbers of 16 bits; .npy, .npz and .zarr have"))
+        << pictures.err;
     refused({"--distance", "--backend", "cuda", "--devices", "2"}, "one GPU draws distances", 5);
 }
 
@@ -353,7 +399,7 @@ TEST(Distance, AFieldBeyondMemoryIsDrawnInSlabs) {
         std::vector<std::string> more;
     };
     for (const way& w : {way{"npy", 700, 4, 1, {}}, way{"npz", 400, 12, 1, {"--band", "1", "-t", "nearest"}},
-                         way{"nvdb", 700, 12, 1, {"--band", "2", "-t", "nearest"}},
+                         way{"npz", 700, 4, 1, {"--half"}}, way{"nvdb", 700, 12, 1, {"--band", "2", "-t", "nearest"}},
                          way{"zarr", 1100, 4, 7, {"--close-holes"}}, way{"nii", 500, 16, 2, {"-t", "normal"}}}) {
         const auto draw = [&](const std::string& name, const std::vector<std::string>& limit) {
             std::vector<std::string> all{folder / "m.glb",

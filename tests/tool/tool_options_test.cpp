@@ -46,6 +46,7 @@ std::set<std::string> all_options() {
             "--slice-bits N",
             "--space AXES",
             "--unsigned",
+            "--half",
             "--corners",
             "--iso D",
             "--remesh",

@@ -56,9 +56,9 @@ std::shared_ptr<cuda_start> start_cuda(const command_line& options) {
     return std::make_shared<cuda_start>();
 }
 
-std::vector<std::filesystem::path> write_to(const volume& voxels, const std::filesystem::path& output,
+std::vector<std::filesystem::path> write_to(volume& voxels, const std::filesystem::path& output,
                                             const write_options& how) {
-    return write(voxels, output, how);
+    return voxels.distances ? write_distances(voxels, output, how) : write(voxels, output, how);
 }
 std::vector<std::filesystem::path> write_to(const sparse_volume& voxels, const std::filesystem::path& output,
                                             const write_options& how) {

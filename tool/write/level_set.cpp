@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "level_set.hpp"
 
-#include "formats/formats.hpp"
+#include "formats/dense_stream.hpp"
 #include "model/parallel.hpp"
 
 #include <voxelpipe/core/brick_tile.hpp>
@@ -10,6 +10,7 @@
 #include <voxelpipe/sparse/host_sparse.hpp>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -259,6 +260,23 @@ void add_level(volume& v, double level) {
         for (std::int64_t j = 0; j < v.extent[1]; ++j)
             for (std::int64_t i = 0; i < v.extent[0]; ++i)
                 if (static_cast<double>(value_at(distances, v.index(i, j, k))) <= level) v.set_bit(bits, i, j, k);
+}
+
+std::vector<std::filesystem::path> write_distances(volume& v, const std::filesystem::path& output,
+                                                   const write_options& options) {
+    const format* const f = find_format(output);
+    channel* const distances = v.find("distance");
+    if (!options.half_distances || f == nullptr || !f->has_halves || distances == nullptr)
+        return write(v, output, options);
+    std::atomic<bool> overflows = false;
+    channel floats = std::move(*distances);
+    *distances = halved(floats, overflows);
+    std::vector<std::filesystem::path> files = write(v, output, options);
+    *distances = std::move(floats);
+    if (overflows && options.warn)
+        options.warn('"' + output.string() +
+                     "\": distances beyond 65504 are infinite in numbers of 16 bits; leave out --half");
+    return files;
 }
 
 std::string cut_band_warning(const band_bricks& field) {

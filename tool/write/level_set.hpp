@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A distance field as the bricks of its band, which is what .nvdb and .vdb hold.
+// A distance field as the bricks of its band, which is what .nvdb and .vdb hold; its levels, and its half floats.
 
+#include "formats/formats.hpp"
 #include "model/sparse_volume.hpp"
 #include "model/volume.hpp"
 
@@ -35,6 +36,11 @@ struct band_bricks {
 [[nodiscard]] bool shows_level(const std::filesystem::path& output);
 // Appends the channel "occupancy": the samples of V whose distance is at most `level`.
 void add_level(volume& v, double level);
+
+// write() of a volume with distances: in half floats where the options and the format have them, which takes no memory.
+// Warns where distances are beyond those. V holds its floats again once it returns.
+std::vector<std::filesystem::path> write_distances(volume& v, const std::filesystem::path& output,
+                                                   const write_options& options);
 
 // One line if the band of a level set is cut off by the grid, so that surfaces there are not closed; else empty.
 [[nodiscard]] std::string cut_band_warning(const band_bricks& field);

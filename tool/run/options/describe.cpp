@@ -264,6 +264,8 @@ void describe_distances(CLI::App& app, raw_options& raw) {
     app.add_flag("--corners", raw.corners,
                  "Samples at the corners of the voxels, one more along each axis. Default: at their centres")
         ->group("Distances");
+    app.add_flag("--half", raw.half, "The field in numbers of 16 bits, each the nearest, in .npy, .npz and .zarr")
+        ->group("Distances");
     app.add_option("--iso", raw.iso,
                    "What pictures, meshes and lists of voxels show of distances: those of at most D; with --remesh the "
                    "distance at which the mesh lies. Default: 0, the model")

@@ -31,6 +31,7 @@ struct raw_options {
     std::string band; // a number or "whole"
     bool is_unsigned = false;
     bool corners = false;
+    bool half = false;
     std::optional<double> iso;
     bool remesh = false;
     std::optional<voxelpipe::place> place;

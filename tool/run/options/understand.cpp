@@ -175,6 +175,7 @@ void understand_distance(command_line& options, const raw_options& raw) {
     const std::pair<const char*, bool> given[]{{"--band", !raw.band.empty()},
                                                {"--unsigned", raw.is_unsigned},
                                                {"--corners", raw.corners},
+                                               {"--half", raw.half},
                                                {"--iso", raw.iso.has_value()}};
     if (!raw.distance) {
         for (const auto& [name, is_given] : given) {
@@ -332,7 +333,9 @@ void understand_outputs(command_line& options, const raw_options& raw) {
     require(options.write.levels, "--levels", "levels", ".zarr has", &format::has_levels);
     require(options.write.pieces != 0, "--pieces", "pieces", ".pvti and .nvdb have", &format::has_pieces);
     require(options.write.slice_bits != 0, "--slice-bits", "slices", "{z}.png has", &format::has_layers);
+    require(raw.half, "--half", "numbers of 16 bits", ".npy, .npz and .zarr have", &format::has_halves);
     require(raw.space.has_value(), "--space", "axes of patients", ".nrrd, .nii and .nii.gz have", &format::has_space);
+    options.write.half_distances = raw.half;
     options.write.space = raw.space.value_or(patient_axes::lps);
     require(!options.block_file.empty(), "--blocks", "blocks", ".schem and .litematic have", &format::has_blocks);
     require(raw.threshold.has_value(), "--threshold", "hexahedra", ".vtu, .inp and .msh have", &format::has_threshold);

@@ -3,9 +3,12 @@
 
 #include "dense_stream.hpp"
 
+#include <voxelpipe/core/half.hpp>
+
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <vector>
 
@@ -55,6 +58,29 @@ std::uint32_t widened_half(std::uint16_t half) {
     // Subnormal: shift the leading one up to the hidden bit.
     const auto shift = static_cast<std::uint32_t>(std::countl_zero(mantissa)) - 21;
     return sign | (113 - shift) << 23 | (mantissa << shift & 0x3ffu) << 13;
+}
+
+channel halved(const channel& floats, std::atomic<bool>& overflows) {
+    channel halves{floats.name, scalar::f16, floats.components, {}};
+    halves.read = [&floats, &overflows](std::uint64_t first, std::span<std::byte> to) {
+        constexpr std::size_t most = 4096; // voxels at a time
+        const auto components = static_cast<std::size_t>(floats.components);
+        std::vector<float> values(std::min(most, to.size() / 2 / components) * components);
+        for (std::size_t done = 0; done < to.size() / 2; done += values.size(), first += values.size() / components) {
+            values.resize(std::min(values.size(), to.size() / 2 - done));
+            const std::span<std::byte> bytes = std::as_writable_bytes(std::span{values});
+            if (floats.read)
+                floats.read(first, bytes);
+            else
+                std::memcpy(bytes.data(), floats.data.data() + first * components * 4, bytes.size());
+            for (std::size_t i = 0; i < values.size(); ++i) {
+                const voxelpipe::half h(values[i]);
+                if ((h.bits & 0x7fffu) == 0x7c00u && std::isfinite(values[i])) overflows = true;
+                std::memcpy(to.data() + 2 * (done + i), &h.bits, 2);
+            }
+        }
+    };
+    return halves;
 }
 
 scalar streamed_type(scalar type, half_floats halves) {

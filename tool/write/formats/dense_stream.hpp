@@ -7,6 +7,7 @@
 
 #include "model/volume.hpp"
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -31,6 +32,10 @@ using byte_sink = std::function<void(std::span<const std::byte>)>;
 [[nodiscard]] std::uint64_t streamed_bytes(const volume& v, const channel& c, half_floats halves);
 // Bytes that the streams of all channels have, those of faces included.
 [[nodiscard]] std::uint64_t streamed_bytes(const volume& v, half_floats halves);
+
+// A channel of floats as one of half floats, each the nearest, ties to even, for formats that keep those. It refers to
+// `floats`, which it reads as it is streamed. Sets `overflows` once a finite float is beyond 65504, and thus infinite.
+[[nodiscard]] channel halved(const channel& floats, std::atomic<bool>& overflows);
 
 // Bytes [begin, begin + size) of the stream, which must be in it. They lie in the channel itself where it is streamed
 // as it is, otherwise in `room`, which is resized to hold them. Several threads may read one channel.

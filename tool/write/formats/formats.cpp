@@ -44,16 +44,17 @@ struct writer {
 };
 
 // A format of arrays, those of faces among them.
-constexpr format of_arrays(std::string_view extension, std::string_view description, bool format::*has = nullptr) {
+template <class... Has>
+constexpr format of_arrays(std::string_view extension, std::string_view description, Has... has) {
     format arrays{extension, description, false, true, false, false};
     arrays.has_faces = true;
-    if (has != nullptr) arrays.*has = true;
+    (void(arrays.*has = true), ...);
     return arrays;
 }
 
 constexpr auto all_formats = std::to_array<format>({
-    of_arrays(".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several"),
-    of_arrays(".npz", "NumPy archive with one array for each channel"),
+    of_arrays(".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several", &format::has_halves),
+    of_arrays(".npz", "NumPy archive with one array for each channel", &format::has_halves),
     {".vox", "MagicaVoxel model, split above 256 voxels, 255 colours", true, false, true, true},
     {".schem", "Minecraft schematic (Sponge 2, WorldEdit) of concrete, wool, terracotta, or see --blocks", true, false,
      true, true, false, false, false, true},
@@ -67,7 +68,7 @@ constexpr auto all_formats = std::to_array<format>({
               &format::has_space),
     of_arrays(".nii.gz", "the same, compressed", &format::has_space),
     of_arrays(".zarr", "Zarr 3 group with a compressed array for each channel, in shards of 256^3; see --levels",
-              &format::has_levels),
+              &format::has_levels, &format::has_halves),
     {".glb", "glTF mesh of the voxels' outer sides, with colours; see --merge", true, false, true, false},
     {".obj", "the same as a Wavefront OBJ of quads, colours at the vertices", true, false, true, false},
     {".ply", "the same as a PLY of quads; with --points the centres of the voxels", true, false, true, false},

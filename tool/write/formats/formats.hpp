@@ -40,9 +40,10 @@ struct write_options {
     std::uint64_t leaves_per_grid = 0xffff'ffff; // .nvdb: most bricks in a grid; the format has no more
     up_axis up = up_axis::y;                     // stands upright in .vox, .schem, .litematic; glTF's is y
     int threads = 0;                             // 0 takes all cores. No output depends on it
-    bool merge_faces = false; // .ply, .obj, .glb, .stl, .3mf: coplanar faces of equal colour become one rectangle
-    bool points = false;      // .ply holds the voxels' centres, not their outer sides
-    bool lists = true;        // .npy, .npz of a sparse volume list its voxels; false: they hold the grid
+    bool merge_faces = false;    // .ply, .obj, .glb, .stl, .3mf: coplanar faces of equal colour become one rectangle
+    bool points = false;         // .ply holds the voxels' centres, not their outer sides
+    bool half_distances = false; // .npy, .npz, .zarr: the channel "distance" in numbers of 16 bits
+    bool lists = true;           // .npy, .npz of a sparse volume list its voxels; false: they hold the grid
     std::uint64_t faces_per_file =
         0; // .ply, .obj, .glb, .stl, .3mf: most faces in a file; 0: what the format can number
     // .vtu, .inp, .msh: the cells are the voxels whose channel "fraction" is at least this one, above 0, rounded to a
@@ -75,6 +76,7 @@ struct format {
     bool has_layers = false;      // a file for each layer of one target: obeys write_options::slice_bits
     bool has_space = false;       // obeys write_options::space
     bool has_faces = false;       // holds volume::faces
+    bool has_halves = false;      // obeys write_options::half_distances
 };
 
 // True if voxels of this size are cubes, but for what fitting a grid loses by rounding.
