@@ -145,6 +145,8 @@ std::vector<needs> all_needs() {
     all.push_back({".npz", "fraction,centroid", "--sparse", 160});
     all.push_back({".vti", "area", "--sparse", sparse_resolution});
     all.push_back({".npy", "links,link_triangle", "--sparse", sparse_resolution});
+    for (const char* const extension : {".inp", ".msh"})
+        all.push_back({extension, "occupancy,material", "--sparse", sparse_resolution});
 #endif
     return all;
 }

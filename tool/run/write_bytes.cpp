@@ -51,9 +51,16 @@ double bytes_of_hexahedra(const std::string& extension, const expected_result& r
     const double parts = std::min(1.0 * result.extent.z * result.extent.y / rows_of_part, double{1 << 22});
     const double waiting =
         std::min(voxels, threads * parts_of_thread * std::max(least_voxels_of_part, rows_of_part * result.extent.x));
+    // Lists of the parts with each kind of sides, which are found before anything waits.
+    const bool has_materials =
+        std::find(result.targets.begin(), result.targets.end(), target::material) != result.targets.end();
+    constexpr double of_sides = 30, of_sides_of_materials = 100;
+    const double sides = has_materials && extension != ".vtu" ? of_sides_of_materials
+                         : extension == ".msh"                ? of_sides
+                                                              : 0;
     constexpr double of_line = 200, of_element = 150, of_corners = 40; // in strings that grow, but for .vtu
     const double of_voxel = extension == ".inp" ? of_line : extension == ".msh" ? of_element : of_corners;
-    return of_brick * bricks + of_part * parts + of_voxel * waiting;
+    return of_brick * bricks + of_part * parts + std::max(of_voxel * waiting, sides * parts);
 }
 
 double bytes_of_picture(const preview_options& options) {

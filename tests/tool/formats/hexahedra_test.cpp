@@ -4,10 +4,13 @@
 // .vtu, .inp and .msh: what read_back.py does not see. It compares whole meshes with what other people's readers find.
 
 #include "test_volumes.hpp"
+#include "write/formats/cell_sets.hpp"
 #include "write/formats/formats.hpp"
 #include "write/formats/hexahedra.hpp"
 #include "write/sparse_formats.hpp"
 
+#include <map>
+#include <set>
 #include <sstream>
 
 using namespace voxelize;
@@ -158,6 +161,82 @@ TEST_F(Hexahedra, NodesAndSidesAreThoseOfTheDefinition) {
     }
 }
 
+// The sides at which sets of cells end, with their nodes, over parts of several planes and rows.
+TEST_F(Hexahedra, SidesOfMaterialsAreThoseOfTheDefinition) {
+    volume v = make_volume({300, 30, 4});
+    v.add("occupancy", scalar::bit);
+    v.add("material", scalar::i32);
+    constexpr int nothing = -2;
+    const auto number = [](std::int64_t x, std::int64_t y, std::int64_t z) { // of a material, -1 for none
+        if (x < 0 || y < 5 || z < 0 || x >= 300 || y >= 30 || z >= 4) return nothing;
+        if (x == 17 && y == 15 && z == 1)
+            return 9; // the last row of its part: the next one has nodes of it, and no sides
+        if (pattern(x, y, z, 0, 0) % 16 == 0) return nothing;
+        return pattern(x / 5, y / 7, z / 2, 1, 0) % 3 == 0 ? static_cast<int>(x / 64 % 4) - 1 : 7;
+    };
+    for (std::int64_t z = 0; z < 4; ++z)
+        for (std::int64_t y = 0; y < 30; ++y)
+            for (std::int64_t x = 0; x < 300; ++x) {
+                v.set_bit(v.channels[0], x, y, z, number(x, y, z) != nothing);
+                store(v.channels[1].data.data() + 4 * v.index(x, y, z), static_cast<std::int32_t>(number(x, y, z)));
+            }
+    const voxel_shape shape(v, 2);
+    const hexahedra mesh(shape, 2);
+    ASSERT_LT(10U, mesh.num_parts());
+    const cell_sets sets(mesh, 2);
+    const side_sets sides(sets, 2);
+    const whole_mesh all(mesh);
+    using cell_and_direction = std::pair<std::uint64_t, unsigned>;
+    std::map<std::string, std::vector<cell_and_direction>> expected;
+    std::map<std::string, std::set<std::uint64_t>> expected_nodes;
+    const auto name = [](int of) { return of < 0 ? "NO_MATERIAL" : "MATERIAL_" + std::to_string(of); };
+    for (std::size_t n = 0; n < all.voxels.size(); ++n)
+        for (unsigned d = 0; d < 6; ++d) {
+            const glm::ivec3& voxel = all.voxels[n];
+            glm::ivec3 there = voxel;
+            there[static_cast<int>(d / 2)] += d % 2 != 0 ? 1 : -1;
+            const int of = number(voxel.x, voxel.y, voxel.z), beside = number(there.x, there.y, there.z);
+            if (of == beside) continue;
+            const std::string both = name(of) + (beside == nothing ? "" : "_" + name(beside));
+            expected[both].emplace_back(n, d);
+            for (const std::uint64_t corner : all.cells[n])
+                if (static_cast<int>(all.nodes[corner][d / 2]) ==
+                    voxel[static_cast<int>(d / 2)] + static_cast<int>(d % 2))
+                    expected_nodes[both].insert(corner);
+        }
+    EXPECT_EQ(6U, sets.all().size());
+    EXPECT_EQ(expected.size(), sides.all().size());
+    for (const side_sets::side_set& set : sides.all()) {
+        const side_choice choice = sides.choice_of(set);
+        std::vector<cell_and_direction> found;
+        for (const side_sets::of_part& each : set.parts) {
+            EXPECT_EQ(each.first, found.size()) << set.name;
+            std::uint64_t cell = mesh.first_cell(each.part);
+            for (const std::uint8_t directions : mesh.sides_of_cells(each.part, choice)) {
+                for (unsigned d = 0; d < 6; ++d)
+                    if ((directions >> d & 1U) != 0) found.emplace_back(cell, d);
+                ++cell;
+            }
+        }
+        EXPECT_EQ(set.sides, found.size()) << set.name;
+        EXPECT_TRUE(expected[set.name] == found) << set.name;
+        number_list nodes;
+        for (const std::size_t part : sides.parts_of_nodes(set))
+            for (const std::uint64_t n : mesh.nodes_of_sides(part, choice)) nodes.push_back(n);
+        EXPECT_TRUE(number_list(expected_nodes[set.name].begin(), expected_nodes[set.name].end()) == nodes) << set.name;
+    }
+    for (std::size_t set = 0; set < sets.all().size(); ++set) {
+        std::set<std::uint64_t> of_cells;
+        for (std::size_t n = 0; n < all.voxels.size(); ++n)
+            if (name(number(all.voxels[n].x, all.voxels[n].y, all.voxels[n].z)) == sets.all()[set].name)
+                of_cells.insert(all.cells[n].begin(), all.cells[n].end());
+        number_list nodes;
+        for (const std::size_t part : mesh.parts_of_nodes(sets.parts_of(set)))
+            for (const std::uint64_t n : mesh.nodes_of_cells(part, sets.cells_of(set))) nodes.push_back(n);
+        EXPECT_TRUE(number_list(of_cells.begin(), of_cells.end()) == nodes) << sets.all()[set].name;
+    }
+}
+
 TEST_F(Hexahedra, SparseVolumesAndAnyThreadsGiveTheSameBytes) {
     volume v = make_colored({70, 40, 9}, 23);
     v.add("material", scalar::i32);
@@ -188,6 +267,18 @@ TEST_F(Hexahedra, WhatCannotBeNumberedIsRefused) {
     const std::string why = refusal(full, "b.inp", options);
     EXPECT_NE(std::string::npos, why.find("up to 26, and there are 27")) << why;
     EXPECT_EQ(std::vector<std::string>{"a.inp"}, names()); // nothing is left of the other
+}
+
+// The sides between two materials have tags above those of all volumes.
+TEST_F(Hexahedra, TagsOfGmshHave31Bits) {
+    volume v = with_voxels({3, 1, 1}, {{0, 0, 0}, {2, 0, 0}});
+    v.add("material", scalar::i32);
+    store(v.channels[1].data.data(), std::int32_t{0x7fff'fffe});
+    EXPECT_EQ("", refusal(v, "a.msh", {}));
+    v.set_bit(v.channels[0], 1, 0, 0);
+    const std::string why = refusal(v, "b.msh", {});
+    EXPECT_NE(std::string::npos, why.find("groups up to 2147483647")) << why;
+    EXPECT_NE(std::string::npos, why.find("sides between materials")) << why;
 }
 
 // Longer numbers are an error of Abaqus.

@@ -9,6 +9,7 @@ The expected values are computed here from the voxel's position, by the function
 compared with another file of ours.
 """
 
+import collections
 import json
 import pathlib
 import sys
@@ -265,11 +266,63 @@ class Hexahedra:
         beside[tuple(edge)] = False
         return ~beside[self.occupied]
 
+    def corners_of_sides(self, cells, direction):
+        """The four nodes, ascending, of the sides of cells in a direction."""
+        import numpy as np
+
+        at_side = np.array([n >> (direction // 2) & 1 for n in (0, 1, 3, 2, 4, 5, 7, 6)]) == direction % 2
+        return np.sort(self.cells[cells][:, at_side], axis=-1)
+
     def nodes_of_sides(self, direction):
         import numpy as np
 
-        at_side = np.array([[n >> (direction // 2) & 1 for n in (0, 1, 3, 2, 4, 5, 7, 6)]])[0] == direction % 2
-        return np.unique(self.cells[self.sides(direction)][:, at_side])
+        return np.unique(self.corners_of_sides(self.sides(direction), direction))
+
+    def numbers(self):
+        """The material of each cell; 0 without materials."""
+        import numpy as np
+
+        return np.zeros(len(self.voxels), np.int32) if self.materials is None else self.materials[self.occupied]
+
+    def sets(self):
+        """Numbers of the sets of cells in order, with their names."""
+        numbers = sorted(set(self.numbers().tolist()), key=lambda n: n if n >= 0 else 1 << 40)
+        return {n: "VOXELS" if self.materials is None else "NO_MATERIAL" if n < 0 else f"MATERIAL_{n}" for n in numbers}
+
+    def side_sets(self):
+        """(set, set beside or None): rows of a cell, a direction and four nodes, for the sides at which sets of cells end."""
+        import numpy as np
+
+        nothing = 1 << 30
+        around = np.full(np.array(self.occupied.shape) + 2, nothing)
+        around[1:-1, 1:-1, 1:-1][self.occupied] = self.numbers()
+        found = []
+        for direction in range(6):
+            there = self.voxels + 1
+            there[:, direction // 2] += 1 if direction % 2 else -1
+            beside = around[there[:, 2], there[:, 1], there[:, 0]]
+            cells = np.flatnonzero(beside != self.numbers())
+            same_direction = np.full(len(cells), direction)
+            nodes = self.corners_of_sides(cells, direction)
+            found.append(np.column_stack([self.numbers()[cells], beside[cells], cells, same_direction, nodes]))
+        rows = np.concatenate(found)
+        rows = rows[np.lexsort((rows[:, 3], rows[:, 2]))]
+        order = [*self.sets(), nothing]
+        groups = {}
+        for a in order:
+            for b in order[-1:] + order[:-1]:
+                chosen = rows[(rows[:, 0] == a) & (rows[:, 1] == b)][:, 2:]
+                if len(chosen) != 0:
+                    groups[a, None if b == nothing else b] = chosen
+        return groups
+
+    def name_of_sides(self, both):
+        return "_".join(self.sets()[n] for n in both if n is not None)
+
+    def is_first(self, both):
+        """For one of the two that have the sides between two sets, and for outer ones."""
+        order = list(self.sets())
+        return both[1] is None or order.index(both[0]) < order.index(both[1])
 
     def check(self, points, cells, name):
         """The mesh as a reader has it; every corner of every cell has the volume of a voxel around it."""
@@ -333,17 +386,24 @@ def check_inp(case, files):
     assert [block.type for block in mesh.cells] == ["hexahedron"]
     want.check(mesh.points, mesh.cells[0].data, file.name)
     sets = {"VOXELS": np.arange(len(want.voxels))}
+    nodes = {}
     if want.materials is not None:
-        numbers = want.materials[want.occupied]
-        for n in np.unique(numbers):
-            sets["NO_MATERIAL" if n < 0 else f"MATERIAL_{n}"] = np.flatnonzero(numbers == n)
+        for n, name in want.sets().items():
+            sets[name] = np.flatnonzero(want.numbers() == n)
+            nodes[name] = np.unique(want.cells[sets[name]])
+        for both, sides in want.side_sets().items():
+            if want.is_first(both):
+                nodes[f"NODES_{want.name_of_sides(both)}"] = np.unique(sides[:, 2:])
     assert set(mesh.cell_sets) == set(sets), f"{file.name}: {list(mesh.cell_sets)}"
     for name, cells in sets.items():
         same(np.concatenate(mesh.cell_sets[name]).astype(np.int64), cells, f"{file.name}: {name}")
+    for name, numbers in nodes.items():
+        same(np.asarray(mesh.point_sets[name]).astype(np.int64), numbers, f"{file.name}: nodes {name}")
     sections = {part.partition("\n")[0]: part.partition("\n")[2].split() for part in text.split("*")}
     # The corners, from 1, of a C3D8's faces S1 to S6.
     faces = [[1, 2, 3, 4], [5, 8, 7, 6], [1, 5, 6, 2], [2, 6, 7, 3], [3, 7, 8, 4], [4, 8, 5, 1]]
-    assert len(mesh.point_sets) == 6
+    assert len(mesh.point_sets) == 6 + len(nodes), list(mesh.point_sets)
+    face_of_direction = []
     for n, direction in enumerate(DIRECTIONS):
         name = direction[1].upper() + ("_NEGATIVE" if direction[0] == "-" else "_POSITIVE")
         lines = sections[f"SURFACE, TYPE=ELEMENT, NAME=SIDES_{name}"]
@@ -354,6 +414,52 @@ def check_inp(case, files):
         inward = mesh.points[mesh.cells[0].data[0]].mean(axis=0) - corners.mean(axis=0)
         assert inward[n // 2] * (1 if direction[0] == "-" else -1) > 0 and np.dot(np.cross(a, b), inward) > 0, f"{file.name}: the face {lines[1]}"
         same(np.asarray(mesh.point_sets[f"NODES_{name}"]).astype(np.int64), want.nodes_of_sides(n), f"{file.name}: nodes {name}")
+        face_of_direction.append(lines[1])
+    surfaces = {name.partition("NAME=SIDES_")[2]: lines for name, lines in sections.items() if name.startswith("SURFACE")}
+    by_materials = want.side_sets() if want.materials is not None else {}
+    assert len(surfaces) == 6 + len(by_materials), list(surfaces)
+    for both, sides in by_materials.items():
+        lines = surfaces[want.name_of_sides(both)]
+        got = np.column_stack([[int(cell.rstrip(",")) - 1 for cell in lines[::2]], [face_of_direction.index(face) for face in lines[1::2]]])
+        same(got, sides[:, :2], f"{file.name}: {want.name_of_sides(both)}")
+
+
+def elements_and_surfaces_of_msh(file, num_volumes, num_surfaces):
+    """The tags of all elements, and the signed tags of the surfaces that bound each volume."""
+    import numpy as np
+
+    data = file.read_bytes()
+
+    def take(at, kind, count):
+        values = np.frombuffer(data, kind, count, at)
+        return values.tolist(), at + values.nbytes
+
+    counts, at = take(data.index(b"$Entities\n") + 10, "<u8", 4)
+    assert counts == [0, 0, num_surfaces, num_volumes], counts
+    bounding = {}
+    for n in range(num_surfaces + num_volumes):
+        (tag,), at = take(at, "<i4", 1)
+        _, at = take(at, "<f8", 6)
+        (groups,), at = take(at, "<u8", 1)
+        physical, at = take(at, "<i4", groups)
+        assert physical == [tag]
+        (boundaries,), at = take(at, "<u8", 1)
+        boundary, at = take(at, "<i4", boundaries)
+        if n < num_surfaces:
+            assert boundary == []
+        else:
+            bounding[tag] = boundary
+    assert data[at:].startswith(b"\n$EndEntities\n")
+    (blocks, elements, least, most), at = take(data.index(b"$Elements\n") + 10, "<u8", 4)
+    tags = []
+    for _ in range(blocks):
+        (dimension, _, _), at = take(at, "<i4", 3)
+        (count,), at = take(at, "<u8", 1)
+        rows, at = take(at, "<u8", count * (1 + 2**dimension))
+        tags += rows[:: 1 + 2**dimension]
+    assert data[at:] == b"\n$EndElements\n"
+    assert (elements, least, most) == (len(tags), min(tags), max(tags))
+    return np.array(tags), bounding
 
 
 def check_msh(case, files):
@@ -365,17 +471,51 @@ def check_msh(case, files):
         assert b"$PhysicalNames\n0\n$EndPhysicalNames\n" in file.read_bytes()
         return
     mesh = meshio.read(file)
-    numbers = np.zeros(len(want.voxels), np.int32) if want.materials is None else want.materials[want.occupied]
-    groups = sorted(set(numbers.tolist()), key=lambda n: n if n >= 0 else 1 << 40)
-    tags = [n + 1 if n >= 0 else max(groups) + 2 for n in groups]
-    names = ["VOXELS" if want.materials is None else "NO_MATERIAL" if n < 0 else f"MATERIAL_{n}" for n in groups]
-    assert {name: list(value) for name, value in mesh.field_data.items()} == {name: [tag, 3] for name, tag in zip(names, tags)}
-    assert [block.type for block in mesh.cells] == ["hexahedron"] * len(groups)
+    sets, sides = want.sets(), want.side_sets()
+    tag_of_none = max(sets) + 2  # that of NO_MATERIAL, whose number is -1
+    volumes = {n: n + 1 if n >= 0 else tag_of_none for n in sets}
+    surfaces, last = {}, max(volumes.values())
+    for both in filter(want.is_first, sides):
+        if both[1] is not None:
+            last += 1
+        surfaces[both] = volumes[both[0]] if both[1] is None else last
+    groups = {name: [volumes[n], 3] for n, name in sets.items()}
+    groups.update({f"SIDES_{want.name_of_sides(both)}": [tag, 2] for both, tag in surfaces.items()})
+    assert {name: list(value) for name, value in mesh.field_data.items()} == groups, mesh.field_data
+    assert [block.type for block in mesh.cells] == ["hexahedron"] * len(sets) + ["quad"] * len(surfaces)
+    blocks = list(zip(mesh.cells, mesh.cell_data["gmsh:physical"]))
     cells = np.empty_like(want.cells)
-    for n, tag, block, physical in zip(groups, tags, mesh.cells, mesh.cell_data["gmsh:physical"]):
+    for (n, tag), (block, physical) in zip(volumes.items(), blocks):
         assert set(physical) == {tag}
-        cells[numbers == n] = block.data
+        cells[want.numbers() == n] = block.data
     want.check(mesh.points, cells, file.name)
+    for (both, tag), (block, physical) in zip(surfaces.items(), blocks[len(sets) :]):
+        name = f"{file.name}: {want.name_of_sides(both)}"
+        assert set(physical) == {tag}
+        same(np.sort(block.data, axis=-1).astype(np.int64), sides[both][:, 2:], name)
+        # Counter-clockwise from outside: the vector area is that of a voxel's side, in the side's direction.
+        corners = mesh.points[block.data]
+        normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]) / 2
+        directions = sides[both][:, 1]
+        expected = np.zeros((len(directions), 3))
+        area = want.size.prod() / want.size[directions // 2]
+        expected[np.arange(len(directions)), directions // 2] = np.where(directions % 2, area, -area)
+        assert np.allclose(normals, expected, rtol=1e-9, atol=1e-9 * area.max()), name
+        # A quadrangle has one cell of its set, and of the set beside it.
+        for n in both:
+            if n is None:
+                continue
+            own = np.flatnonzero(want.numbers() == n)
+            faces = np.concatenate([want.corners_of_sides(own, d) for d in range(6)])
+            faces = [tuple(face) for face in faces.tolist()]
+            times = collections.Counter(faces)
+            assert all(times[tuple(quad)] == 1 for quad in np.sort(block.data, axis=-1).tolist()), f"{name}: cells of {sets[n]}"
+    tags, bounding = elements_and_surfaces_of_msh(file, len(sets), len(surfaces))
+    of_cells = np.concatenate([np.flatnonzero(want.numbers() == n) + 1 for n in volumes])
+    same(tags, np.concatenate([of_cells, np.arange(len(of_cells), len(tags)) + 1]), f"{file.name}: tags of elements")
+    for n, tag in volumes.items():
+        signed = [t if both[0] == n else -t for both, t in surfaces.items() if n in both]
+        assert bounding[tag] == signed, f"{file.name}: the boundary of {sets[n]}: {bounding[tag]}"
 
 
 def check_nrrd(case, files):

@@ -108,20 +108,30 @@ bit_rows hexahedra::node_rows(const bit_rows& below, const bit_rows& above) {
     return nodes;
 }
 
-bit_rows hexahedra::side_rows(int plane, int row, int end, unsigned direction) const {
-    const int axis = static_cast<int>(direction / 2), step = direction % 2 == 0 ? -1 : 1;
-    bit_rows sides = voxel_rows(plane, row, end);
-    const bit_rows beside = axis == 2   ? voxel_rows(plane + step, row, end)
-                            : axis == 1 ? voxel_rows(plane, row + step, end + step)
-                                        : sides;
-    for (std::size_t y = 0; y < static_cast<std::size_t>(end - row); ++y)
-        for (std::size_t w = 0; w < words_; ++w) {
-            const std::uint64_t* const from = beside.row(y);
+hexahedra::rows_around hexahedra::around(int plane, int row, int end, const side_choice& sides) const {
+    const auto chosen = [&](const cell_choice& cells, int at, int first, int last) {
+        return cells ? cells(at, first, last) : voxel_rows(at, first, last);
+    };
+    const auto beside = [&](int at) { return chosen(sides.beside, at, row - 1, end + 1); };
+    return {chosen(sides.of, plane, row, end),
+            {beside(plane - 1), beside(plane), beside(plane + 1)},
+            sides.beside == nullptr};
+}
+
+bit_rows hexahedra::side_rows(const rows_around& rows, unsigned direction) {
+    const unsigned axis = direction / 2;
+    const bool is_upper = direction % 2 != 0;
+    const bit_rows& beside = rows.beside[axis == 2 ? 2 * (direction % 2) : 1];
+    bit_rows sides = rows.of;
+    for (std::size_t y = 0; y < sides.data.size() / sides.words; ++y) {
+        const std::uint64_t* const from = beside.row(axis == 1 ? y + 2 * (direction % 2) : y + 1);
+        for (std::size_t w = 0; w < sides.words; ++w) {
             std::uint64_t neighbours = from[w];
-            if (axis == 0 && step < 0) neighbours = from[w] << 1U | (w == 0 ? 0 : from[w - 1] >> 63U);
-            if (axis == 0 && step > 0) neighbours = from[w] >> 1U | (w + 1 == words_ ? 0 : from[w + 1] << 63U);
-            sides.row(y)[w] &= ~neighbours;
+            if (axis == 0 && !is_upper) neighbours = from[w] << 1U | (w == 0 ? 0 : from[w - 1] >> 63U);
+            if (axis == 0 && is_upper) neighbours = from[w] >> 1U | (w + 1 == sides.words ? 0 : from[w + 1] << 63U);
+            sides.row(y)[w] &= rows.is_outer ? ~neighbours : neighbours;
         }
+    }
     return sides;
 }
 
@@ -138,7 +148,7 @@ std::vector<std::uint64_t> hexahedra::cells_at_side(std::size_t part, unsigned d
     std::vector<std::uint64_t> numbers;
     if (cells_of(part) == 0) return numbers;
     const place p = place_of(part);
-    const bit_rows sides = side_rows(p.plane, p.row, p.end_row, direction);
+    const bit_rows sides = side_rows(around(p.plane, p.row, p.end_row, {}), direction);
     const bit_rows voxels = voxel_rows(p.plane, p.row, p.end_row);
     std::uint64_t number = first_cell_[part];
     for (std::size_t n = 0; n < voxels.data.size(); ++n)
@@ -147,36 +157,96 @@ std::vector<std::uint64_t> hexahedra::cells_at_side(std::size_t part, unsigned d
     return numbers;
 }
 
-std::vector<std::uint64_t> hexahedra::nodes_at_side(std::size_t part, unsigned direction) const {
-    std::vector<std::uint64_t> numbers;
-    if (nodes_of(part) == 0) return numbers;
+std::vector<std::uint8_t> hexahedra::sides_of_cells(std::size_t part, const side_choice& sides) const {
+    std::vector<std::uint8_t> result(cells_of(part));
+    if (result.empty()) return result;
     const place p = place_of(part);
-    const auto rows = static_cast<std::size_t>(p.end_node_row - p.row);
-    const unsigned axis = direction / 2;
-    const bool is_upper = direction % 2 != 0;
-    bit_rows marked(rows, words_);
-    // A node of a row has a voxel before it and one after it along each axis; along the sides' axis one of them counts.
-    for (const int dz : {-1, 0}) {
-        if (axis == 2 && is_upper != (dz == -1)) continue;
-        const bit_rows sides = side_rows(p.plane + dz, p.row - 1, p.end_node_row, direction);
-        for (std::size_t y = 0; y < rows; ++y)
-            for (const std::size_t dy : {std::size_t{0}, std::size_t{1}}) {
-                if (axis == 1 && is_upper != (dy == 0)) continue;
-                const std::uint64_t* const from = sides.row(y + dy);
-                if (axis != 0) add_both_ends(from, marked.row(y), words_);
-                std::uint64_t carry = 0;
-                for (std::size_t w = 0; axis == 0 && w < words_; ++w) {
-                    marked.row(y)[w] |= is_upper ? from[w] << 1U | carry : from[w];
-                    carry = from[w] >> 63U;
-                }
+    const rows_around rows = around(p.plane, p.row, p.end_row, sides);
+    const bit_rows voxels = voxel_rows(p.plane, p.row, p.end_row);
+    const std::vector<std::uint64_t> first = ranks(voxels, 0);
+    for (unsigned direction = 0; direction < 6; ++direction) {
+        const bit_rows chosen = side_rows(rows, direction);
+        for (std::size_t n = 0; n < chosen.data.size(); ++n)
+            for (std::uint64_t bits = chosen.data[n]; bits != 0; bits &= bits - 1) {
+                const std::uint64_t before = voxels.data[n] & ((bits & (~bits + 1)) - 1);
+                result[first[n] + static_cast<std::uint64_t>(std::popcount(before))] |=
+                    static_cast<std::uint8_t>(1U << direction);
             }
     }
+    return result;
+}
+
+void hexahedra::mark_nodes(const place& p, const side_choice& sides, unsigned directions, bit_rows& marked) const {
+    // A node of a row has a voxel before it and one after it along each axis; along the sides' axis one of them counts.
+    for (const int dz : {-1, 0}) {
+        const rows_around rows = around(p.plane + dz, p.row - 1, p.end_node_row, sides);
+        for (unsigned direction = 0; direction < 6; ++direction) {
+            const unsigned axis = direction / 2;
+            const bool is_upper = direction % 2 != 0;
+            if ((directions >> direction & 1U) == 0 || (axis == 2 && is_upper != (dz == -1))) continue;
+            const bit_rows chosen = side_rows(rows, direction);
+            for (std::size_t y = 0; y < marked.data.size() / words_; ++y)
+                for (const std::size_t dy : {std::size_t{0}, std::size_t{1}}) {
+                    if (axis == 1 && is_upper != (dy == 0)) continue;
+                    const std::uint64_t* const from = chosen.row(y + dy);
+                    if (axis != 0) add_both_ends(from, marked.row(y), words_);
+                    std::uint64_t carry = 0;
+                    for (std::size_t w = 0; axis == 0 && w < words_; ++w) {
+                        marked.row(y)[w] |= is_upper ? from[w] << 1U | carry : from[w];
+                        carry = from[w] >> 63U;
+                    }
+                }
+        }
+    }
+}
+
+std::vector<std::uint64_t> hexahedra::marked_nodes(std::size_t part, const bit_rows& marked) const {
+    const place p = place_of(part);
     const bit_rows nodes = node_rows(p.plane, p.row, p.end_node_row);
+    std::vector<std::uint64_t> numbers;
     std::uint64_t number = first_node_[part];
     for (std::size_t n = 0; n < nodes.data.size(); ++n)
         for (std::uint64_t bits = nodes.data[n]; bits != 0; bits &= bits - 1, ++number)
             if ((marked.data[n] & bits & (~bits + 1)) != 0) numbers.push_back(number);
     return numbers;
+}
+
+std::vector<std::uint64_t> hexahedra::nodes_at_side(std::size_t part, unsigned direction) const {
+    if (nodes_of(part) == 0) return {};
+    const place p = place_of(part);
+    bit_rows marked(static_cast<std::size_t>(p.end_node_row - p.row), words_);
+    mark_nodes(p, {}, 1U << direction, marked);
+    return marked_nodes(part, marked);
+}
+
+std::vector<std::uint64_t> hexahedra::nodes_of_sides(std::size_t part, const side_choice& sides) const {
+    constexpr unsigned all_directions = 63;
+    if (nodes_of(part) == 0) return {};
+    const place p = place_of(part);
+    bit_rows marked(static_cast<std::size_t>(p.end_node_row - p.row), words_);
+    mark_nodes(p, sides, all_directions, marked);
+    return marked_nodes(part, marked);
+}
+
+std::vector<std::uint64_t> hexahedra::nodes_of_cells(std::size_t part, const cell_choice& cells) const {
+    if (nodes_of(part) == 0) return {};
+    const place p = place_of(part);
+    return marked_nodes(
+        part, node_rows(cells(p.plane - 1, p.row - 1, p.end_node_row), cells(p.plane, p.row - 1, p.end_node_row)));
+}
+
+std::vector<std::size_t> hexahedra::parts_of_nodes(std::span<const std::size_t> parts) const {
+    std::vector<bool> has_nodes(num_parts());
+    for (const std::size_t part : parts)
+        for (const std::size_t above : {part, part + in_plane_}) {
+            has_nodes[above] = true;
+            if (above % in_plane_ + 1 != in_plane_) has_nodes[above + 1] = true;
+        }
+    std::vector<std::size_t> result;
+    result.reserve(static_cast<std::size_t>(std::count(has_nodes.begin(), has_nodes.end(), true)));
+    for (std::size_t part = 0; part < has_nodes.size(); ++part)
+        if (has_nodes[part]) result.push_back(part);
+    return result;
 }
 
 } // namespace voxelize

@@ -13,10 +13,13 @@
 
 #include "voxel_shape.hpp"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -35,6 +38,15 @@ struct bit_rows {
 // The six outward directions, in the order of their numbers: 0 -x, 1 +x, 2 -y, 3 +y, 4 -z, 5 +z.
 inline constexpr std::array<const char*, 6> direction_names{"X_NEGATIVE", "X_POSITIVE", "Y_NEGATIVE",
                                                             "Y_POSITIVE", "Z_NEGATIVE", "Z_POSITIVE"};
+
+// Some of the cells: returns the bits of those that lie in the rows [row, end) of a plane, none outside of the grid.
+using cell_choice = std::function<bit_rows(int plane, int row, int end)>;
+
+// Some of the sides: those of the cells `of`, or of all cells, that have a neighbour which is one of the cells `beside`
+// or, without `beside`, that have no neighbour.
+struct side_choice {
+    cell_choice of, beside;
+};
 
 // Refers to the shape.
 class hexahedra {
@@ -60,6 +72,30 @@ public:
     // Calls visit(number, brick, glm::ivec3 voxel) for each cell of a part.
     template <class Visit>
     void for_each_voxel(std::size_t part, const Visit& visit) const;
+    // Calls visit(plane, row, end) with the rows [row, end) of a plane that a part's cells lie in.
+    template <class Visit>
+    void with_rows(std::size_t part, const Visit& visit) const {
+        const place p = place_of(part);
+        visit(p.plane, p.row, p.end_row);
+    }
+    // Calls visit(brick, glm::ivec3 voxel) for the voxels in the rows [row, end) of a plane, by y, then x; none lie
+    // outside of the grid.
+    template <class Visit>
+    void for_each_voxel_of_rows(int plane, int row, int end, const Visit& visit) const;
+    // Voxels of the rows [row, end) of a plane, none outside of the grid.
+    [[nodiscard]] bit_rows voxel_rows(int plane, int row, int end) const;
+    [[nodiscard]] std::size_t words_of_row() const { return words_; }
+    // The number of the first bit at or after the start of each word, where bits are numbered on from `first`.
+    [[nodiscard]] static std::vector<std::uint64_t> ranks(const bit_rows& rows, std::uint64_t first);
+
+    // For each cell of a part the sides that are chosen: bit d is set for that in direction d.
+    [[nodiscard]] std::vector<std::uint8_t> sides_of_cells(std::size_t part, const side_choice& sides) const;
+    // Numbers of the nodes of a part that chosen sides of any cells have, ascending.
+    [[nodiscard]] std::vector<std::uint64_t> nodes_of_sides(std::size_t part, const side_choice& sides) const;
+    // Numbers of the nodes of a part that chosen cells have, ascending.
+    [[nodiscard]] std::vector<std::uint64_t> nodes_of_cells(std::size_t part, const cell_choice& cells) const;
+    // The parts that have the nodes of cells of these parts. Both lists ascend.
+    [[nodiscard]] std::vector<std::size_t> parts_of_nodes(std::span<const std::size_t> parts) const;
     // Numbers of the cells of a part without a neighbour in a direction, ascending.
     [[nodiscard]] std::vector<std::uint64_t> cells_at_side(std::size_t part, unsigned direction) const;
     // Numbers of the nodes of a part that such sides of any cells have, ascending.
@@ -71,15 +107,22 @@ private:
         int end_node_row;
     };
     [[nodiscard]] place place_of(std::size_t part) const;
-    // Voxels of the rows [row, end) of a plane, none outside of the grid.
-    [[nodiscard]] bit_rows voxel_rows(int plane, int row, int end) const;
     [[nodiscard]] bit_rows node_rows(int plane, int row, int end) const;
     // Nodes between two planes of voxels, whose rows begin one row before those of the nodes and end with them.
     [[nodiscard]] static bit_rows node_rows(const bit_rows& below, const bit_rows& above);
-    // Those of the voxels that have no neighbour in a direction.
-    [[nodiscard]] bit_rows side_rows(int plane, int row, int end, unsigned direction) const;
-    // The number of the first node at or after each word of rows that follow each other.
-    [[nodiscard]] static std::vector<std::uint64_t> ranks(const bit_rows& rows, std::uint64_t first);
+    // Rows of cells that sides may be of, and those of what may lie beside them: the planes below, of and above the
+    // cells, each from one row before them to one after them.
+    struct rows_around {
+        bit_rows of;
+        std::array<bit_rows, 3> beside;
+        bool is_outer; // sides are where nothing lies beside
+    };
+    [[nodiscard]] rows_around around(int plane, int row, int end, const side_choice& sides) const;
+    // Those of the cells that have a chosen side in a direction.
+    [[nodiscard]] static bit_rows side_rows(const rows_around& rows, unsigned direction);
+    // Adds the nodes of the chosen sides in some directions, bit d for direction d.
+    void mark_nodes(const place& p, const side_choice& sides, unsigned directions, bit_rows& marked) const;
+    [[nodiscard]] std::vector<std::uint64_t> marked_nodes(std::size_t part, const bit_rows& marked) const;
 
     const voxel_shape& shape_;
     brick_order order_;
@@ -139,20 +182,28 @@ void hexahedra::for_each_cell(std::size_t part, const Visit& visit) const {
 }
 
 template <class Visit>
+void hexahedra::for_each_voxel_of_rows(int plane, int row, int end, const Visit& visit) const {
+    if (plane < 0 || plane >= shape_.extent[2]) return;
+    const auto layer = order_.layer_at(plane / 8);
+    const auto n = static_cast<unsigned>(plane % 8);
+    for (int r = std::max(row, 0) / 8; 8 * r < end; ++r) {
+        const auto bricks = brick_order::row_of(layer, r);
+        for (int y = std::max(8 * r, row); y < std::min(8 * r + 8, end); ++y) {
+            const auto b = static_cast<unsigned>(y - 8 * r);
+            for (const brick_order::placed& brick : bricks)
+                for (unsigned bits = brick_row(shape_.mask(brick.brick), 2, n, b); bits != 0; bits &= bits - 1)
+                    visit(brick.brick, order_.voxel_at(brick, n, static_cast<unsigned>(std::countr_zero(bits)), b));
+        }
+    }
+}
+
+template <class Visit>
 void hexahedra::for_each_voxel(std::size_t part, const Visit& visit) const {
     if (cells_of(part) == 0) return;
     const place p = place_of(part);
-    const auto layer = order_.layer_at(p.plane / 8);
     std::uint64_t number = first_cell_[part];
-    for (int row = p.row / 8; row < (p.end_row + 7) / 8; ++row) {
-        const auto bricks = brick_order::row_of(layer, row);
-        const auto n = static_cast<unsigned>(p.plane % 8);
-        for (unsigned b = 0; b < 8; ++b)
-            for (const brick_order::placed& brick : bricks)
-                for (unsigned bits = brick_row(shape_.mask(brick.brick), 2, n, b); bits != 0; bits &= bits - 1)
-                    visit(number++, brick.brick,
-                          order_.voxel_at(brick, n, static_cast<unsigned>(std::countr_zero(bits)), b));
-    }
+    for_each_voxel_of_rows(p.plane, p.row, p.end_row,
+                           [&](std::size_t brick, const glm::ivec3& voxel) { visit(number++, brick, voxel); });
 }
 
 } // namespace voxelize

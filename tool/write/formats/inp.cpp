@@ -9,7 +9,9 @@
 #include "model/parallel.hpp"
 
 #include <array>
+#include <bit>
 #include <charconv>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -58,11 +60,18 @@ std::string numbered_lines(std::span<const std::uint64_t> numbers) {
     return text;
 }
 
+// The side of an element in a direction, as a line of a surface.
+void append_side(std::string& text, std::uint64_t element, unsigned direction) {
+    append_number(text, element);
+    text.append(", ").append(face_names[direction]).append("\n");
+}
+
 class inp_writer {
 public:
     inp_writer(output_file& out, const hexahedra& mesh, const write_options& options)
         : out_(out), mesh_(mesh), threads_(options.threads), sets_(mesh, options.threads),
-          meter_(options.progress, mesh.num_parts() * (2 + (has_materials() ? sets_.all().size() : 0) + 12)) {}
+          sides_(has_materials() ? std::make_unique<const side_sets>(sets_, options.threads) : nullptr),
+          meter_(options.progress, num_steps()) {}
 
     void write() {
         const std::array<std::vector<std::string>, 3> places{short_coordinates(mesh_.shape(), 0),
@@ -90,15 +99,40 @@ public:
             });
             return text;
         });
-        if (has_materials())
+        if (has_materials()) {
             for (std::size_t set = 0; set < sets_.all().size(); ++set) write_material(set);
+            for (const side_sets::side_set& set : sides_->all()) write_side_set(set);
+        }
         for (unsigned direction = 0; direction < 6; ++direction) write_side(direction);
     }
 
 private:
     [[nodiscard]] bool has_materials() const { return mesh_.shape().has_materials(); }
 
-    // Writes what make(part) returns.
+    // Parts to write, in all.
+    [[nodiscard]] std::uint64_t num_steps() const {
+        constexpr std::uint64_t of_all = 2, of_directions = 12;
+        std::uint64_t steps = mesh_.num_parts() * (of_all + of_directions);
+        if (!has_materials()) return steps;
+        for (std::size_t set = 0; set < sets_.all().size(); ++set) {
+            const std::vector<std::size_t> parts = sets_.parts_of(set);
+            steps += parts.size() + mesh_.parts_of_nodes(parts).size();
+        }
+        for (const side_sets::side_set& set : sides_->all())
+            steps += set.parts.size() + (set.is_first() ? sides_->parts_of_nodes(set).size() : 0);
+        return steps;
+    }
+
+    // Writes what make(part) returns, for some parts or all of them.
+    template <class Make>
+    void parts(std::span<const std::size_t> some, const Make& make) {
+        ordered_for(
+            some.size(), thread_count(threads_), [&](std::size_t n) { return make(some[n]); },
+            [&](std::size_t, const std::string& text) {
+                out_.write(text);
+                meter_.advance(1);
+            });
+    }
     template <class Make>
     void parts(const Make& make) {
         ordered_for(mesh_.num_parts(), thread_count(threads_), make, [&](std::size_t, const std::string& text) {
@@ -107,14 +141,40 @@ private:
         });
     }
     void write_material(std::size_t set) {
-        out_.write("*ELSET, ELSET=" + sets_.all()[set].name + "\n");
-        parts([&](std::size_t part) {
+        const std::string& name = sets_.all()[set].name;
+        const std::vector<std::size_t> of_set = sets_.parts_of(set);
+        out_.write("*ELSET, ELSET=" + name + "\n");
+        parts(of_set, [&](std::size_t part) {
             std::vector<std::uint64_t> numbers;
-            if (sets_.is_in(part, set))
-                mesh_.for_each_voxel(part, [&](std::uint64_t cell, std::size_t brick, const glm::ivec3& voxel) {
-                    if (sets_.set_of(brick, voxel) == set) numbers.push_back(cell);
-                });
+            mesh_.for_each_voxel(part, [&](std::uint64_t cell, std::size_t brick, const glm::ivec3& voxel) {
+                if (sets_.set_of(brick, voxel) == set) numbers.push_back(cell);
+            });
             return numbered_lines(numbers);
+        });
+        out_.write("*NSET, NSET=" + name + "\n");
+        const cell_choice cells = sets_.cells_of(set);
+        parts(mesh_.parts_of_nodes(of_set),
+              [&](std::size_t part) { return numbered_lines(mesh_.nodes_of_cells(part, cells)); });
+    }
+    void write_side_set(const side_sets::side_set& set) {
+        const side_choice sides = sides_->choice_of(set);
+        if (set.is_first()) { // the other one of two has the same nodes
+            out_.write("*NSET, NSET=NODES_" + set.name + "\n");
+            parts(sides_->parts_of_nodes(set),
+                  [&](std::size_t part) { return numbered_lines(mesh_.nodes_of_sides(part, sides)); });
+        }
+        out_.write("*SURFACE, TYPE=ELEMENT, NAME=SIDES_" + set.name + "\n");
+        std::vector<std::size_t> of_set;
+        for (const side_sets::of_part& each : set.parts) of_set.push_back(each.part);
+        parts(of_set, [&](std::size_t part) {
+            std::string text;
+            std::uint64_t number = mesh_.first_cell(part);
+            for (const std::uint8_t directions : mesh_.sides_of_cells(part, sides)) {
+                ++number;
+                for (unsigned bits = directions; bits != 0; bits &= bits - 1)
+                    append_side(text, number, static_cast<unsigned>(std::countr_zero(bits)));
+            }
+            return text;
         });
     }
     void write_side(unsigned direction) {
@@ -124,10 +184,8 @@ private:
         out_.write("*SURFACE, TYPE=ELEMENT, NAME=SIDES_" + name + "\n");
         parts([&](std::size_t part) {
             std::string text;
-            for (const std::uint64_t cell : mesh_.cells_at_side(part, direction)) {
-                append_number(text, cell + 1);
-                text.append(", ").append(face_names[direction]).append("\n");
-            }
+            for (const std::uint64_t cell : mesh_.cells_at_side(part, direction))
+                append_side(text, cell + 1, direction);
             return text;
         });
     }
@@ -136,6 +194,7 @@ private:
     const hexahedra& mesh_;
     int threads_;
     cell_sets sets_;
+    std::unique_ptr<const side_sets> sides_; // where there are materials
     progress_meter meter_;
 };
 

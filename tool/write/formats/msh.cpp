@@ -9,20 +9,48 @@
 #include "write_items.hpp"
 
 #include <array>
+#include <bit>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace voxelize {
 namespace {
 
-constexpr std::int32_t gmsh_hexahedron = 5, of_volumes = 3;
+constexpr std::int32_t gmsh_quadrangle = 3, gmsh_hexahedron = 5, of_surfaces = 2, of_volumes = 3;
+
+// The corners of the side of a cell in each direction, counter-clockwise as seen from outside.
+constexpr std::array<std::array<std::size_t, 4>, 6> corners_of_side{
+    {{0, 4, 7, 3}, {1, 2, 6, 5}, {0, 1, 5, 4}, {3, 7, 6, 2}, {0, 3, 2, 1}, {4, 5, 6, 7}}};
+
+// A surface, with its tag: each side once.
+struct gmsh_surface {
+    std::int32_t tag;
+    const side_sets::side_set* sides;
+};
+
+// The outer sides of a volume have its tag; those between two volumes have tags above those of all volumes.
+std::vector<gmsh_surface> surfaces_of(const cell_sets& sets, const side_sets& sides,
+                                      const std::filesystem::path& path) {
+    std::vector<gmsh_surface> surfaces;
+    std::int64_t tag = sets.all().empty() ? 0 : sets.all().back().number + 1;
+    for (const side_sets::side_set& set : sides.all())
+        if (set.is_first())
+            surfaces.push_back({static_cast<std::int32_t>(set.beside ? ++tag : sets.all()[set.of].number + 1), &set});
+    if (tag > std::numeric_limits<std::int32_t>::max())
+        throw write_error(path, ".msh has groups up to " + std::to_string(std::numeric_limits<std::int32_t>::max()) +
+                                    ", and there are a material " + std::to_string(sets.all().back().number) +
+                                    " and sides between materials, which come after it");
+    return surfaces;
+}
 
 class msh_writer {
 public:
-    msh_writer(output_file& out, const hexahedra& mesh, const cell_sets& sets, const write_options& options)
-        : out_(out), mesh_(mesh), sets_(sets), threads_(options.threads),
-          meter_(options.progress, mesh.num_parts() * (2 + sets.all().size())) {}
+    msh_writer(output_file& out, const hexahedra& mesh, const cell_sets& sets, const side_sets& sides,
+               std::vector<gmsh_surface> surfaces, const write_options& options)
+        : out_(out), mesh_(mesh), sets_(sets), sides_(sides), surfaces_(std::move(surfaces)), threads_(options.threads),
+          meter_(options.progress, num_steps()) {}
 
     void write() {
         std::string text = "$MeshFormat\n4.1 1 8\n";
@@ -39,10 +67,17 @@ public:
         out_.write(text);
         write_nodes();
         text = "\n$EndNodes\n$Elements\n";
-        const std::uint64_t cells = mesh_.num_cells();
-        for (const std::uint64_t n : {std::uint64_t{sets_.all().size()}, cells, blocks, cells}) put(text, n);
+        std::uint64_t elements = mesh_.num_cells();
+        for (const gmsh_surface& each : surfaces_) elements += each.sides->sides;
+        for (const std::uint64_t n : {std::uint64_t{sets_.all().size() + surfaces_.size()}, elements, blocks, elements})
+            put(text, n);
         out_.write(text);
         for (std::size_t set = 0; set < sets_.all().size(); ++set) write_elements(set);
+        std::uint64_t first = mesh_.num_cells() + 1;
+        for (const gmsh_surface& each : surfaces_) {
+            write_sides(each, first);
+            first += each.sides->sides;
+        }
         out_.write("\n$EndElements\n");
     }
 
@@ -51,25 +86,45 @@ private:
         return static_cast<std::int32_t>(sets_.all()[set].number + 1);
     }
 
+    // Parts to write, in all.
+    [[nodiscard]] std::uint64_t num_steps() const {
+        std::uint64_t steps = mesh_.num_parts() * (2 + sets_.all().size());
+        for (const gmsh_surface& each : surfaces_) steps += each.sides->parts.size();
+        return steps;
+    }
+
     void add_groups(std::string& text) const {
         const auto& sets = sets_.all();
-        text += "$PhysicalNames\n" + std::to_string(sets.size()) + "\n";
+        text += "$PhysicalNames\n" + std::to_string(surfaces_.size() + sets.size()) + "\n";
+        for (const gmsh_surface& each : surfaces_)
+            text += "2 " + std::to_string(each.tag) + " \"SIDES_" + each.sides->name + "\"\n";
         for (std::size_t set = 0; set < sets.size(); ++set)
             text += "3 " + std::to_string(tag(set)) + " \"" + sets[set].name + "\"\n";
         text += "$EndPhysicalNames\n$Entities\n";
-        for (const std::uint64_t count :
-             {std::uint64_t{0}, std::uint64_t{0}, std::uint64_t{0}, std::uint64_t{sets.size()}})
-            put(text, count);
+        for (const std::size_t count : {std::size_t{0}, std::size_t{0}, surfaces_.size(), sets.size()})
+            put(text, std::uint64_t{count});
+        for (const gmsh_surface& each : surfaces_) add_entity(text, each.tag, {});
         for (std::size_t set = 0; set < sets.size(); ++set) {
-            put(text, tag(set));
-            for (std::size_t a = 0; a < 3; ++a) put(text, mesh_.shape().origin[a]); // the box of the grid
-            for (std::size_t a = 0; a < 3; ++a)
-                put(text, world(mesh_.shape(), a, static_cast<double>(mesh_.shape().extent[a])));
-            put(text, std::uint64_t{1});
-            put(text, tag(set));
-            put(text, std::uint64_t{0}); // of bounding surfaces
+            std::vector<std::int32_t> boundary;
+            for (const gmsh_surface& each : surfaces_) {
+                if (each.sides->of == set) boundary.push_back(each.tag);
+                if (each.sides->beside == set) boundary.push_back(-each.tag); // its quadrangles look into the volume
+            }
+            add_entity(text, tag(set), boundary);
         }
         text += "\n$EndEntities\n";
+    }
+
+    // A surface or a volume that is all of a physical group with its tag.
+    void add_entity(std::string& text, std::int32_t tag, const std::vector<std::int32_t>& boundary) const {
+        put(text, tag);
+        for (std::size_t a = 0; a < 3; ++a) put(text, mesh_.shape().origin[a]); // the box of the grid
+        for (std::size_t a = 0; a < 3; ++a)
+            put(text, world(mesh_.shape(), a, static_cast<double>(mesh_.shape().extent[a])));
+        put(text, std::uint64_t{1});
+        put(text, tag);
+        put(text, std::uint64_t{boundary.size()});
+        for (const std::int32_t each : boundary) put(text, each);
     }
 
     // Writes what make(part, text) appends.
@@ -123,9 +178,47 @@ private:
         });
     }
 
+    void write_sides(const gmsh_surface& each, std::uint64_t first) {
+        std::string text;
+        for (const std::int32_t n : {of_surfaces, each.tag, gmsh_quadrangle}) put(text, n);
+        put(text, each.sides->sides);
+        out_.write(text);
+        const side_choice choice = sides_.choice_of(*each.sides);
+        const std::vector<side_sets::of_part>& some = each.sides->parts;
+        ordered_for(
+            some.size(), thread_count(threads_),
+            [&](std::size_t n) {
+                const std::uint64_t end = n + 1 == some.size() ? each.sides->sides : some[n + 1].first;
+                return quadrangles(some[n].part, choice, first + some[n].first, end - some[n].first);
+            },
+            [&](std::size_t, const std::string& elements) {
+                out_.write(elements);
+                meter_.advance(1);
+            });
+    }
+
+    // As many sides of a part, by their cells and directions, with tags from the first one on.
+    [[nodiscard]] std::string quadrangles(std::size_t part, const side_choice& choice, std::uint64_t tag,
+                                          std::uint64_t count) const {
+        std::string text;
+        text.reserve(count * 5 * sizeof(std::uint64_t));
+        const std::vector<std::uint8_t> sides = mesh_.sides_of_cells(part, choice);
+        const std::uint64_t first = mesh_.first_cell(part);
+        mesh_.for_each_cell(part, [&](std::uint64_t cell, const std::array<std::uint64_t, 8>& corners) {
+            for (unsigned bits = sides[cell - first]; bits != 0; bits &= bits - 1) {
+                put(text, tag++);
+                for (const std::size_t corner : corners_of_side[static_cast<std::size_t>(std::countr_zero(bits))])
+                    put(text, corners[corner] + 1);
+            }
+        });
+        return text;
+    }
+
     output_file& out_;
     const hexahedra& mesh_;
     const cell_sets& sets_;
+    const side_sets& sides_;
+    std::vector<gmsh_surface> surfaces_;
     int threads_;
     progress_meter meter_;
 };
@@ -142,7 +235,8 @@ std::vector<std::filesystem::path> write_msh(const voxel_shape& v, const std::fi
             throw write_error(path, ".msh has groups up to " +
                                         std::to_string(std::numeric_limits<std::int32_t>::max()) +
                                         ", and there is a material " + std::to_string(set.number));
-    msh_writer(out, mesh, sets, options).write();
+    const side_sets sides(sets, options.threads);
+    msh_writer(out, mesh, sets, sides, surfaces_of(sets, sides, path), options).write();
     out.commit();
     return {path};
 }
