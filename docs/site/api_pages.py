@@ -73,6 +73,7 @@ TASKS = [
     ("A closed mesh of any triangles", "samples/19_remesh.cpp", "remesh", "surfaces"),
     ("Colours of its vertices", "samples/20_scan.cpp", "call", "surfaces"),
     ("How much of a voxel is inside", "samples/guide/solids.cpp", "fractions", "cells"),
+    ("The mean colour of thin layers", "samples/25_thin_colors.cpp", "paint", "cells"),
     ("Links that a mesh cuts", "samples/24_links.cpp", "links", "cells"),
     ("Connected components", "samples/guide/solids.cpp", "labels", "label"),
     ("Instances", "samples/09_forest.cpp", "instances", "meshes"),
