@@ -190,7 +190,7 @@ run_suite() {
     local part=$1 folder=$2 source program
     for source in tests/{stages,strategies,robustness}/*_test.cu api_test.cu; do
         case $source in # these are in a program that has another file's name
-        */solid_calls_test.cu | */device_repairs_test.cu | */surfaces_async_test.cu | */cut_cells_async_test.cu | */distance_async_test.cu | */programs_*_test.cu | */sparse_*_test.cu | */several_draws_test.cu | \
+        */solid_calls_test.cu | */device_repairs_test.cu | */surfaces_async_test.cu | */cut_cells_*async_test.cu | */distance_async_test.cu | */programs_*_test.cu | */sparse_*_test.cu | */several_draws_test.cu | \
             */workspace_test.cu) continue ;;
         esac
         program="build/$folder/tests/strategies/device_$(basename "$source" .cu)"

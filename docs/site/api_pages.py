@@ -38,7 +38,7 @@ CPP = {
                    "distance/device/distance_async.cuh", "distance/device/sparse_distance_async.cuh", "programs/device/distance_program_async.cuh",
                    "distance/core/point_triangle.hpp"]),
     "label": ("Labels", "Connected components of bits.", ["label/label.hpp", "label/voxel_component.hpp"]),
-    "cells": ("Cut cells", "How much of each voxel is inside, and where links between voxels are cut.", ["cells/cells.hpp", "cells/sparse_cells.hpp", "cells/cell_programs.hpp", "cells/device/cells_async.cuh", "cells/links.hpp", "cells/core/link_crossing.hpp"]),
+    "cells": ("Cut cells", "How much of each voxel is inside, and where links between voxels are cut.", ["cells/cells.hpp", "cells/sparse_cells.hpp", "cells/cell_programs.hpp", "cells/device/cells_async.cuh", "cells/device/sparse_cells_async.cuh", "cells/links.hpp", "cells/core/link_crossing.hpp"]),
     "sparse": ("Sparse grids", "Memory in proportion to the voxels that are drawn: bricks, octrees, files.",
                ["sparse/sparse.hpp", "sparse/host_sparse.hpp", "sparse/sparse_merge.hpp", "core/brick_table.hpp", "core/brick_tile.hpp", "sparse/brick_lookup.hpp", "sparse/octree.hpp", "core/octree_view.hpp",
                 "levels/reducers.hpp", "sparse/octree_dag.hpp", "sparse/backend_octree.hpp", "sparse/backend_octree_dag.hpp", "core/octree_dag_view.hpp", "sparse/io/nanovdb.hpp"]),

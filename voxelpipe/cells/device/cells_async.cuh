@@ -46,6 +46,7 @@ struct cell_state {
     std::uint64_t records; // that passes work on; 0 if not all fit
     std::uint64_t triangles_in;
     std::uint64_t counts_voxels; // 0 or 1
+    std::uint64_t listed_voxels; // those that a call into bricks lists, whether or not they fit
 };
 
 struct note_cells {
@@ -96,17 +97,18 @@ struct unless_stopped {
     }
 };
 
-// The memory of a call, in the order of its arrays, and its launches.
-template <class Draw, class... Targets>
+// The memory of a call's records, in the order of its arrays, and the launches that list and sort them.
+template <class Draw>
 class async_cells {
-    using cell_shader = std::remove_cvref_t<decltype(std::declval<Draw>().fragment_shader)>;
     using vertex_shader = std::remove_cvref_t<decltype(std::declval<Draw>().vertex_shader)>;
     using mesh_type = std::remove_cvref_t<decltype(std::declval<Draw>().mesh)>;
+
+public:
+    using cell_shader = std::remove_cvref_t<decltype(std::declval<Draw>().fragment_shader)>;
     using walk_type = core::passes::cell_walk<cell_shader>;
     using terms_type = typename walk_type::terms_type;
     using cursor = typename walk_type::cursor;
 
-public:
     // fits(): false if vertices, edges, rows or records cannot be numbered; then there is no memory.
     async_cells(std::span<const Draw> draws, const grid& g, const cell_options& options, std::uint64_t room,
                 arena& memory)
@@ -142,14 +144,22 @@ public:
         sort_ = memory.take<std::uint8_t>(sort_bytes_);
         terms_ = memory.take<terms_type>(room);
         names_ = memory.take<std::uint32_t>(num_named() + 1); // one, of vertex 0, for bad indices
-        cursors_ = keys_of_.bodies == 1 ? nullptr : memory.take<cursor>(rows_ * keys_of_.bodies);
     }
     [[nodiscard]] bool fits() const {
         return vertices_ < core::max_numbered && triangles_ < core::max_numbered && num_edges() < core::max_numbered &&
                room_ < core::max_numbered && num_keys_ >> 63 == 0;
     }
 
-    void launch(const framebuffer_view<Targets...>& fb, cudaStream_t stream) const {
+    [[nodiscard]] cell_state* state() const { return state_; }
+    [[nodiscard]] std::uint64_t num_rows() const { return rows_; } // of the grid
+    [[nodiscard]] std::uint64_t num_bodies() const { return keys_of_.bodies; }
+    // The cursors of a walk along `rows` rows at a time; null with one body.
+    [[nodiscard]] cursor* take_cursors(std::uint64_t rows, arena& memory) const {
+        return keys_of_.bodies == 1 ? nullptr : memory.take<cursor>(rows * keys_of_.bodies);
+    }
+
+    // The sorted records, and behind the first state()->records those of no voxel. If they do not fit, that is 0.
+    [[nodiscard]] core::passes::record_list<terms_type> list(cudaStream_t stream) const {
         using namespace core::passes;
         std::uint64_t* const counts = state_->counts;
         const unsigned int* const error = &state_->call.index_error;
@@ -187,14 +197,26 @@ public:
         run(room_, fill_cell_keys{&state_->records, static_cast<std::uint64_t>(num_keys_), keys_[0], order_[0]},
             stream);
         const int at = sort(room_, key_bits(), stream);
-        const record_list<terms_type> records{keys_of_, keys_[at], order_[at], terms_, room_};
+        return {keys_of_, keys_[at], order_[at], terms_, room_};
+    }
+    // What looks at the sums of the rows of the grid.
+    [[nodiscard]] core::passes::measure_rows<terms_type>
+    measure(const core::passes::record_list<terms_type>& records) const {
         constexpr std::uint64_t safe = std::uint64_t{1} << 19; // triangles whose covers cannot wrap
-        measure_cell_rows(measure_rows<terms_type>{records, triangles_ >= safe, counts}, rows_ * keys_of_.bodies,
-                          stream);
+        return {records, triangles_ >= safe, state_->counts};
+    }
+    [[nodiscard]] walk_type walk(const core::passes::record_list<terms_type>& records, cursor* cursors) const {
+        return {records, joined(), shaders_, cursors, grid_.offset, options_.axis, extent_.x};
+    }
+    // All of a call into a framebuffer.
+    template <class... Targets>
+    void draw_into(const framebuffer_view<Targets...>& fb, cursor* cursors, cudaStream_t stream) const {
+        const auto records = list(stream);
+        measure_cell_rows(measure(records), rows_ * keys_of_.bodies, stream);
         run(1, stop_large_windings{state_}, stream);
         clear_framebuffer(fb, &state_->call, stream);
-        const walk_type walk{records, mesh, shaders_, cursors_, grid_.offset, options_.axis, extent_.x};
-        shade_cell_rows(shade_cells<cell_shader, Targets...>{walk, fb, counts}, rows_, error, stream);
+        shade_cell_rows(core::passes::shade_cells<cell_shader, Targets...>{walk(records, cursors), fb, state_->counts},
+                        rows_, &state_->call.index_error, stream);
     }
 
 private:
@@ -269,7 +291,6 @@ private:
     std::uint64_t* keys_[2] = {nullptr, nullptr};
     std::uint32_t* order_[2] = {nullptr, nullptr};
     terms_type* terms_ = nullptr;
-    cursor* cursors_ = nullptr;
 };
 
 [[nodiscard]] inline status validate_async(const cell_options& options, const grid& g) {
@@ -291,9 +312,10 @@ template <class Mesh, class VertexShader, class CellShader, class... Targets>
     if (s.counts.triangles_in == 0) return sizeof(device::cell_state);
     return device::bytes_or_none([&]() -> std::size_t {
         device::arena plan;
-        const device::async_cells<draw<Mesh, VertexShader, CellShader>, Targets...> call(draws, g, options,
-                                                                                         limits.records, plan);
-        return call.fits() ? plan.used() : 0;
+        const device::async_cells<draw<Mesh, VertexShader, CellShader>> call(draws, g, options, limits.records, plan);
+        if (!call.fits()) return 0;
+        (void)call.take_cursors(call.num_rows(), plan);
+        return plan.used();
     });
 }
 
@@ -326,9 +348,10 @@ template <class Mesh, class VertexShader, class CellShader, class... Targets>
                 return {};
             }
             device::arena memory(workspace.memory);
-            const device::async_cells<draw<Mesh, VertexShader, CellShader>, Targets...> call(
-                draws, g, options, workspace.limits.records, memory);
-            device::launch_until(stage::coarse_raster, [&] { call.launch(fb, backend.stream); });
+            const device::async_cells<draw<Mesh, VertexShader, CellShader>> call(draws, g, options,
+                                                                                 workspace.limits.records, memory);
+            auto* const cursors = call.take_cursors(call.num_rows(), memory);
+            device::launch_until(stage::coarse_raster, [&] { call.draw_into(fb, cursors, backend.stream); });
             return {};
         });
     } else {
@@ -336,17 +359,26 @@ template <class Mesh, class VertexShader, class CellShader, class... Targets>
     }
 }
 
+namespace device {
+
+// Waits. The status of a call in this memory, and its state: ok too where something did not fit.
+[[nodiscard]] inline status read_cells(cuda_backend& backend, const void* memory, cell_state& state) {
+    if (const status s = read_start(memory, state, backend.stream); !s.ok()) return s;
+    if ((state.call.index_error & bad_numbers) != 0) return core::failure(status_code::bad_subset);
+    cell_options options;
+    options.count_voxels = state.counts_voxels != 0;
+    const std::vector<std::uint64_t> counts(std::begin(state.counts), std::end(state.counts));
+    return core::make_cell_status(counts, options, state.triangles_in, std::uint64_t{state.list.num_terms});
+}
+
+} // namespace device
+
 // Waits for the stream and returns the status of the last call in this workspace, that of voxelize_cells. `need` may be
 // null. Where the records did not fit (capacity_exceeded), *need receives limits that suffice for the same call.
 [[nodiscard]] inline status read_cells_status(cuda_backend& backend, const cell_workspace_view& workspace,
                                               cell_limits* need = nullptr) {
     device::cell_state state{};
-    if (const status s = device::read_start(workspace.memory, state, backend.stream); !s.ok()) return s;
-    if ((state.call.index_error & device::bad_numbers) != 0) return core::failure(status_code::bad_subset);
-    cell_options options;
-    options.count_voxels = state.counts_voxels != 0;
-    const std::vector<std::uint64_t> counts(std::begin(state.counts), std::end(state.counts));
-    const status s = core::make_cell_status(counts, options, state.triangles_in, std::uint64_t{state.list.num_terms});
+    const status s = device::read_cells(backend, workspace.memory, state);
     if (!s.ok() || (state.call.index_error & device::stopped) == 0) return s;
     if (need != nullptr) need->records = std::max(workspace.limits.records, std::uint64_t{state.list.num_terms});
     status failed = core::failure(status_code::capacity_exceeded, stage::coarse_raster);

@@ -10,6 +10,7 @@
 #include <voxelpipe/device/scene/key_sort.cuh>
 #include <voxelpipe/device/scene/prefix_sum.cuh>
 #include <voxelpipe/sparse/passes/row_runs.hpp>
+#include <voxelpipe/sparse/passes/solid_bricks.hpp>
 
 #include <glm/vec3.hpp>
 
@@ -124,6 +125,19 @@ public:
         const core::join_rows<All> join{above.first_child, 0, below.view()};
         count_and_write(join, above, to.first, [&](core::join_rows<All>& j) { j.bounds = to.bounds; });
     }
+    // Two passes over a level's rows of a functor with `count`, `counts` and `first`: it counts, and then writes what
+    // write(f) has given it arrays for.
+    template <class F, class Write>
+    void count_and_write(F f, const bounded_level& of, unsigned long long* first, const Write& write) const {
+        clear_counts(of.rows);
+        f.counts = counts_;
+        run<true>(of.rows + 1, f, of.count);
+        sum(first, of.rows);
+        f.counts = nullptr;
+        f.first = reinterpret_cast<const std::uint64_t*>(first);
+        write(f);
+        run<false>(of.rows, f, of.count);
+    }
     // Lists cells of a level's rows behind the first *begin of `to`; if there is no room for all, none. *end becomes
     // *begin and their number. first: scratch, one more than rows.
     void list(core::cells_beyond cells, const bounded_level& of, const bounded_cells& to, unsigned long long* first,
@@ -141,18 +155,6 @@ private:
     void sum(unsigned long long* first, std::uint64_t rows) const {
         sum_counts(counts_, first, static_cast<std::uint32_t>(rows + 1), storage_, scan_bytes(), stage::tile_resolve,
                    stream_);
-    }
-    // Two passes of a functor with `counts` and `first`.
-    template <class F, class Write>
-    void count_and_write(F f, const bounded_level& of, unsigned long long* first, const Write& write) const {
-        clear_counts(of.rows);
-        f.counts = counts_;
-        run<true>(of.rows + 1, f, of.count);
-        sum(first, of.rows);
-        f.counts = nullptr;
-        f.first = reinterpret_cast<const std::uint64_t*>(first);
-        write(f);
-        run<false>(of.rows, f, of.count);
     }
 
     std::uint64_t rows_;
@@ -195,5 +197,31 @@ void bounded_rows<N>::list(core::cells_beyond cells, const bounded_level& of, co
     cells.rows = to.rows[0];
     for_each(of.rows, list_cells_within{cells, of.count, begin, end, to.room}, stage::tile_resolve, stream_);
 }
+
+// How many bricks get masks: none, if there is no room for all.
+struct take_bricks {
+    const unsigned long long* bricks;
+    std::uint64_t room;
+    unsigned long long* taken;
+    __device__ void operator()(std::uint64_t) const { *taken = *bricks > room ? 0 : *bricks; }
+};
+// compose_first_rows for the rows that there are, and one more.
+struct compose_within {
+    core::compose_first_rows compose;
+    const unsigned long long* rows;
+    __device__ void operator()(std::uint64_t i) const {
+        if (*rows != 0 && i <= *rows) compose(i);
+    }
+};
+// F makes tiles of the cells of one level, in place.
+template <class F>
+struct make_tiles_within {
+    F make;
+    const unsigned long long *begin, *end;
+    std::uint64_t room;
+    __device__ void operator()(std::uint64_t i) const {
+        if (*end <= room && *begin <= i && i < *end) make(i);
+    }
+};
 
 } // namespace voxelpipe::device

@@ -25,30 +25,6 @@ struct end_runs {
     std::uint64_t* first;
     __device__ void operator()(std::uint64_t) const { first[totals->rows] = totals->bounds; }
 };
-// How many bricks get masks: none, if there is no room for all.
-struct take_bricks {
-    const unsigned long long* bricks;
-    std::uint64_t room;
-    unsigned long long* taken;
-    __device__ void operator()(std::uint64_t) const { *taken = *bricks > room ? 0 : *bricks; }
-};
-// compose_first_rows for the rows that there are, and one more.
-struct compose_within {
-    core::compose_first_rows compose;
-    const unsigned long long* rows;
-    __device__ void operator()(std::uint64_t i) const {
-        if (*rows != 0 && i <= *rows) compose(i);
-    }
-};
-// make_tiles of the cells of one level.
-struct make_tiles_within {
-    core::make_tiles make; // in place
-    const unsigned long long *begin, *end;
-    std::uint64_t room;
-    __device__ void operator()(std::uint64_t i) const {
-        if (*end <= room && *begin <= i && i < *end) make(i);
-    }
-};
 
 template <int = 0> // so that programs that do not call it compile no kernels
 class bounded_solid_bricks {
@@ -205,8 +181,10 @@ void bounded_solid_bricks<N>::list_tiles(const bounded_runs& all) {
         passes_.list(
             {here.keys, 0, inside->view(), inside_above.view(), reinterpret_cast<const std::uint64_t*>(here.parent), 2},
             here, tiles_, first_, begin, numbers_ + (l + 1));
-        for_each(room_, make_tiles_within{{tiles_.keys[0], l, tiles_.keys[0], tiles_.rows[0]}, begin, end, room_},
-                 where, stream_);
+        for_each(
+            room_,
+            make_tiles_within<core::make_tiles>{{tiles_.keys[0], l, tiles_.keys[0], tiles_.rows[0]}, begin, end, room_},
+            where, stream_);
         here = above;
         inside = &inside_above;
     }
