@@ -78,6 +78,7 @@ int main() {
     vp::voxelize(backend, layers, grid, numbers).or_throw();
 
     std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, paint>> paints;
+    paints.reserve(tubes.size());
     for (std::size_t i = 0; i < tubes.size(); ++i)
         paints.push_back({{tubes[i].positions, tubes[i].triangles}, {}, {colors[i]}});
     vp::framebuffer<vp::cpu_backend, sum, sum, sum, sum> sums{backend, grid.extent};

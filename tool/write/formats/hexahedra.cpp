@@ -124,7 +124,7 @@ bit_rows hexahedra::side_rows(const rows_around& rows, unsigned direction) {
     const bit_rows& beside = rows.beside[axis == 2 ? 2 * (direction % 2) : 1];
     bit_rows sides = rows.of;
     for (std::size_t y = 0; y < sides.data.size() / sides.words; ++y) {
-        const std::uint64_t* const from = beside.row(axis == 1 ? y + 2 * (direction % 2) : y + 1);
+        const std::uint64_t* const from = beside.row(axis != 1 ? y + 1 : is_upper ? y + 2 : y);
         for (std::size_t w = 0; w < sides.words; ++w) {
             std::uint64_t neighbours = from[w];
             if (axis == 0 && !is_upper) neighbours = from[w] << 1U | (w == 0 ? 0 : from[w - 1] >> 63U);
