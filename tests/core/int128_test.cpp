@@ -26,7 +26,7 @@ static_assert(std::is_trivially_copyable_v<ours_signed> && sizeof(ours_signed) =
 static_assert(!std::is_convertible_v<ours_signed, ours_unsigned>, "mixed signs are to be converted in writing");
 static_assert(!std::is_convertible_v<ours_signed, std::int64_t>, "nothing is cut off without a word");
 // At compile time there is no instruction of the processor's.
-static_assert(ours_unsigned(1) << 100 == (ours_unsigned(1) << 50) * (ours_unsigned(1) << 50));
+static_assert((ours_unsigned(1) << 100) == (ours_unsigned(1) << 50) * (ours_unsigned(1) << 50));
 static_assert(((ours_signed(-7) << 90) + 5) / (ours_signed(1) << 90) == -6);
 static_assert(((ours_signed(-7) << 90) + 5) % (ours_signed(1) << 90) == 5 - (ours_signed(1) << 90));
 
@@ -152,7 +152,7 @@ TEST(Int128, IntegersConvertWithTheirSign) {
     n -= 1;
     n >>= 36;
     EXPECT_TRUE(n == ~std::uint64_t{0});
-    EXPECT_TRUE(++n == ours_signed(1) << 64);
+    EXPECT_TRUE(++n == (ours_signed(1) << 64));
 }
 
 } // namespace

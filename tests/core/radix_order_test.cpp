@@ -30,7 +30,7 @@ std::vector<std::uint32_t> all_of(std::size_t count) {
 
 TEST(RadixOrder, IsThatOfAStableSortBySeveralKeys) {
     std::mt19937_64 random(1);
-    for (const std::size_t count : {0, 1, 2, 300, 5000})
+    for (const std::size_t count : {0U, 1U, 2U, 300U, 5000U})
         for (const int bits : {0, 1, 11, 12, 43, 64}) {
             std::vector<std::int64_t> first(count);
             std::vector<std::uint64_t> second(count);
