@@ -43,8 +43,10 @@ def append(name, lines, seen):
         if include and depth == 0 and include[1] in seen:
             continue
         if include and (ROOT / include[1]).is_file():
-            assert depth == 0, f"{name} includes {include[1]} under a condition"
-            append(include[1], lines, seen)
+            if depth == 0:
+                append(include[1], lines, seen)
+            else:  # it stands under the condition, with what it includes; others that include it have it again
+                append(include[1], body, set(seen))
         elif line.strip() != "#pragma once" and not line.startswith("// SPDX-"):
             if include and depth == 0:
                 seen.add(include[1])
