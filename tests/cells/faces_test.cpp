@@ -167,8 +167,12 @@ TEST(CellFaces, AreThoseOfTheNeighbours) {
             cut += v.next_centroid != std::array<float, 3>{} ? 1 : 0;
         });
         EXPECT_GT(cut, 50u);
-        for (const auto& [begin, size] :
-             {std::pair{glm::ivec3(4, 2, 3), glm::ivec3(3, 5, 4)}, {glm::ivec3(0, 3, 0), glm::ivec3(12, 2, 10)}}) {
+        struct box_of_voxels {
+            glm::ivec3 begin, size;
+        };
+        for (const box_of_voxels& box : {box_of_voxels{glm::ivec3(4, 2, 3), glm::ivec3(3, 5, 4)},
+                                         box_of_voxels{glm::ivec3(0, 3, 0), glm::ivec3(12, 2, 10)}}) {
+            const glm::ivec3 begin = box.begin, size = box.size;
             const auto part = faces_of(m, g.crop(begin, size), axis);
             for_each_voxel(size, [&](const glm::ivec3& p) {
                 const glm::ivec3 at = p + begin;
