@@ -259,7 +259,8 @@ TEST(Distance, HalfFloatsAreTheNearest) {
     ASSERT_EQ(0, measure(folder, file, "o.npy", {"--band", "whole"}).code);
     const array floats = read_npy(folder / "o.npy");
     const outcome result =
-        measure(folder, file, "h.npy", {"--band", "whole", "--half", "-o", folder / "h.png", "-o", folder / "h.vti"});
+        measure(folder, file, "h.npy",
+                {"--band", "whole", "--half", "-o", folder / "h.png", "-o", folder / "h.vti", "--image-size", "64x48"});
     ASSERT_EQ(0, result.code) << result.err;
     EXPECT_EQ(std::string::npos, result.err.find("65504")) << result.err;
     const array halves = read_npy(folder / "h.npy");
@@ -272,7 +273,8 @@ TEST(Distance, HalfFloatsAreTheNearest) {
         rounded += static_cast<float>(h) != floats.at<float>(i) ? 1 : 0;
     }
     EXPECT_LT(100, rounded);
-    ASSERT_EQ(0, measure(folder, file, "f.vti", {"--band", "whole", "-o", folder / "f.png"}).code);
+    ASSERT_EQ(
+        0, measure(folder, file, "f.vti", {"--band", "whole", "-o", folder / "f.png", "--image-size", "64x48"}).code);
     EXPECT_TRUE(read_file(folder / "f.vti") == read_file(folder / "h.vti"));
     EXPECT_TRUE(read_file(folder / "f.png") == read_file(folder / "h.png"));
 
