@@ -89,7 +89,7 @@ struct channel {
     channel_bytes data;
     // In place of data: writes the values of the voxels from number `first` on, in storage order, as many as `to` has
     // room for; bits as bytes 0 and 1. Any thread may call it. Only dense_stream.hpp and level_set.hpp read such
-    // channels; f16 has none.
+    // channels; those of f16 come from halved(), for formats that keep half floats.
     std::function<void(std::uint64_t first, std::span<std::byte> to)> read = {};
 };
 
