@@ -73,6 +73,7 @@ int main() {
     vp::cpu_backend backend;
 
     std::vector<vp::draw<vp::mesh_view<>, vp::passthrough, number_of_draw>> layers;
+    layers.reserve(tubes.size());
     for (const tube& t : tubes) layers.push_back({{t.positions, t.triangles}, {}, {}});
     vp::framebuffer<vp::cpu_backend, vp::target<std::uint32_t, vp::blend::replace>> numbers{backend, grid.extent};
     vp::voxelize(backend, layers, grid, numbers).or_throw();
