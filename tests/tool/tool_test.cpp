@@ -393,7 +393,7 @@ TEST(Tool, EveryFormatTakesEveryTarget) {
     const scratch_folder folder;
     gltf_test::small_world().write_glb(folder / "m.glb");
     for (const voxelize::format& entry : voxelize::formats()) {
-        if (entry.has_layers) continue; // slices hold one target: tool_fraction_test.cpp
+        if (entry.has_layers) continue; // slices hold one target: tool_slices_test.cpp
         const std::string out = folder / std::string("o").append(entry.extension);
         const outcome result =
             run(folder, {folder / "m.glb", "-o", out, "-r", "20", "-t", all_targets, "--image-size", "64x48"});
