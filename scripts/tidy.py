@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """tidy.py [--deep] BUILD JOBS REGEX...: clang-tidy over the sources in BUILD/compile_commands.json that a REGEX matches.
 
-clang's static analyzer takes three quarters of the time, so that it runs with --deep alone.
+clang's static analyzer takes three quarters of the time, so that it runs with --deep alone, and so do SLOW_CHECKS.
 
 Most of a run goes into the headers that sources share: all samples, or all sources of the tool, that have the same flags are
 checked as one file, their texts one behind the other, so that checks that look at a main file see each of them. Where two sources have the same name
@@ -12,6 +12,7 @@ not come out clean is checked again, each source apart, and that counts: the mes
 """
 
 import concurrent.futures
+import itertools
 import json
 import pathlib
 import re
@@ -40,10 +41,17 @@ def flags_of(entry):
     return tuple(kept)
 
 
-def check(folder, source, is_deep):
-    checks = [] if is_deep else ["--checks=-clang-analyzer-*"]
-    command = ["clang-tidy-14", "-quiet", *checks, "-p", str(folder), str(source)]
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+# These take a third of the time of all checks but the analyzer's.
+SLOW_CHECKS = ("bugprone-assert-side-effect", "bugprone-infinite-loop", "bugprone-multiple-statement-macro", "bugprone-stringview-nullptr",
+               "bugprone-suspicious-semicolon", "bugprone-suspicious-string-compare", "bugprone-undelegated-constructor",
+               "bugprone-unused-raii", "readability-redundant-control-flow")
+
+
+def check(source, is_deep, how, folder):
+    """Whether a source is clean, and what clang-tidy says. HOW names the compiler's flags or the folder of their database."""
+    checks = [] if is_deep else ["--checks=-clang-analyzer-*," + ",".join(f"-{name}" for name in SLOW_CHECKS)]
+    command = ["clang-tidy-14", "-quiet", *checks, str(source), *how]
+    done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     return done.returncode == 0, done.stdout
 
 
@@ -68,6 +76,12 @@ def each_in_a_namespace(sources):
     return "".join(heads + bodies)
 
 
+def layouts_of(sources):
+    """Ways to put sources into one file, in the order in which they are tried; of programs only one will do."""
+    programs = sum(1 for s in sources if re.search(r"^int main\(", text_of(s), re.MULTILINE))
+    return (each_in_a_namespace,) if programs > 1 else (one_behind_the_other, each_in_a_namespace)
+
+
 def main():
     arguments = sys.argv[1:]
     is_deep = arguments[0] == "--deep"
@@ -87,44 +101,37 @@ def main():
 
     joined = build / "tidy"
     joined.mkdir(exist_ok=True)
+    numbers = itertools.count()
 
-    def compiles(arguments):
-        return subprocess.run([*arguments, "-fsyntax-only", "-w"], cwd=build, stderr=subprocess.DEVNULL, check=False).returncode == 0
-
-    # The database's entries and their sources; a group that does not go into one file is halved until it does.
-    database = []
-    def join(flags, sources):
-        text = joined / f"joined_{len(database)}.cpp"
-        folders = sorted({f"-iquote{pathlib.Path(s).parent}" for s in sources})
-        arguments = [flags[0], *folders, *flags[1:], "-c", str(text)]
-        for layout in (one_behind_the_other, each_in_a_namespace):
-            text.write_text(layout(sources), encoding="utf-8")
-            if len(sources) == 1 or compiles(arguments):
-                database.append(({"directory": str(build), "file": str(text), "arguments": arguments}, sources))
-                return
-        middle = len(sources) // 2
-        print("note: not in one file:", *(pathlib.Path(s).name for s in sources[:middle]), "|", *(pathlib.Path(s).name for s in sources[middle:]))
-        join(flags, sources[:middle])
-        join(flags, sources[middle:])
-
-    for (_, flags), sources in groups.items():
-        join(flags, sources)
-    (joined / "compile_commands.json").write_text(json.dumps([entry for entry, _ in database], indent=1))
-
-    def check_group(text, sources):
+    # Whether all are clean, and what there is to print. A group that does not go into one file is halved until it does.
+    def check_group(flags, sources):
         names = ", ".join(pathlib.Path(s).name for s in sources)
-        if check(joined, text, is_deep)[0]:
-            return True, f"clean: {names}\n"
-        results = [check(build, s, is_deep) for s in sources]
+        folders = sorted({f"-iquote{pathlib.Path(s).parent}" for s in sources})
+        for layout in layouts_of(sources) if len(sources) > 1 else []:
+            text = joined / f"joined_{next(numbers)}.cpp"
+            text.write_text(layout(sources), encoding="utf-8")
+            clean, output = check(text, is_deep, ["--", *folders, *flags[1:]], build)
+            if clean:
+                return True, f"clean: {names}\n"
+            if "[clang-diagnostic-error]" not in output:
+                break
+        else:
+            if len(sources) > 1:
+                middle = len(sources) // 2
+                halves = [check_group(flags, sources[:middle]), check_group(flags, sources[middle:])]
+                return all(clean for clean, _ in halves), f"note: not in one file: {names}\n" + "".join(text for _, text in halves)
+        results = [check(s, is_deep, ["-p", str(build)], build) for s in sources]
         if all(clean for clean, _ in results):
-            return True, f"note: clean, but only apart: {names}\n"
+            return True, f"clean, each apart: {names}\n"
         return False, "".join(output for clean, output in results if not clean)
 
-    texts = [(pathlib.Path(entry["file"]), sources) for entry, sources in database]
-    largest_first = sorted(texts, key=lambda pair: -pair[0].stat().st_size)
+    def length(group):
+        return sum(pathlib.Path(s).stat().st_size for s in group[1])
+
+    largest_first = sorted(((flags, sources) for (_, flags), sources in groups.items()), key=length, reverse=True)
     failed = False
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        for clean, text in pool.map(lambda pair: check_group(*pair), largest_first):
+        for clean, text in pool.map(lambda group: check_group(*group), largest_first):
             print(text, end="", flush=True)
             failed = failed or not clean
     sys.exit(1 if failed else 0)

@@ -208,4 +208,26 @@ TEST(ToolOutputs, PartsOfKilledRunsGo) {
     EXPECT_EQ("mine", read_file(folder / "x.zarr.part0/mine.txt"));
 }
 
+// Formats with numbers of 16 or 32 bits: before the grid is drawn, and before the outputs that are named earlier are
+// written.
+TEST(ToolOutputs, AFormatThatCannotNumberTheGridIsNamedFirst) {
+    const scratch_folder folder;
+    put(folder / "bar.obj", "v 0 0 0\nv 40000 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+    put(folder / "cube.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+    const auto refused = [&](std::vector<std::string> arguments, const std::string& output,
+                             const std::string& message) {
+        arguments[0] = folder / arguments[0];
+        arguments.insert(arguments.end(), {"-o", folder / "first.npy", "-o", folder / output});
+        const outcome result = run(folder, arguments);
+        EXPECT_EQ(4, result.code) << result.err;
+        EXPECT_NE(std::string::npos, result.err.find(message)) << result.err << "does not have\n" << message;
+        EXPECT_FALSE(fs::exists(folder / "first.npy"));
+    };
+    const std::string sides = "which ends at 32767 voxels along an axis: this grid has 40000 x 1 x 1; use .npz";
+    refused({"bar.obj", "--voxel-size", "1"}, "a.nii.gz", sides);
+    refused({"bar.obj", "--voxel-size", "1"}, "a.schem", sides);
+    refused({"cube.obj", "-r", "1300"}, "a.litematic", "2147483647 voxels in all: this grid has 1300 x 1300 x 1300");
+    EXPECT_EQ(0, run(folder, {folder / "bar.obj", "-r", "32767", "-o", folder / "a.nii"}).code);
+}
+
 } // namespace

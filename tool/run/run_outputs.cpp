@@ -48,6 +48,8 @@ void check_outputs(const command_line& options, const voxelize_request& request,
     if (!options.block_file.empty())
         check.add_input(options.block_file, "the list of blocks '" + options.block_file.string() + '\'');
     for (const fs::path& output : options.outputs) {
+        if (!request.remesh)
+            check_extent(output, {request.grid.extent.x, request.grid.extent.y, request.grid.extent.z});
         if (is_standard_output(output)) {
             if (names_of_output(options, request, output, held).files.size() > 1)
                 throw output_conflict("output '" + output.string() +

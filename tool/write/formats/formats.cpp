@@ -52,21 +52,31 @@ constexpr format of_arrays(std::string_view extension, std::string_view descript
     return arrays;
 }
 
+// A format whose numbers of voxels have 16 or 32 bits.
+constexpr format up_to(format limited, std::int64_t most_side, std::int64_t most_voxels = 0) {
+    limited.most_side = most_side;
+    limited.most_voxels = most_voxels;
+    return limited;
+}
+
 constexpr auto all_formats = std::to_array<format>({
     of_arrays(".npy", "NumPy array (nz, ny, nx[, components]); OUT.CHANNEL.npy for several", &format::has_halves),
     of_arrays(".npz", "NumPy archive with one array for each channel", &format::has_halves),
     {".vox", "MagicaVoxel model, split above 256 voxels, 255 colours", true, false, true, true},
-    {".schem", "Minecraft schematic (Sponge 2, WorldEdit) of concrete, wool, terracotta, or see --blocks", true, false,
-     true, true, false, false, false, true},
-    {".litematic", "the same blocks for Litematica", true, false, true, true, false, false, false, true},
+    up_to({".schem", "Minecraft schematic (Sponge 2, WorldEdit) of concrete, wool, terracotta, or see --blocks", true,
+           false, true, true, false, false, false, true},
+          INT16_MAX, INT32_MAX),
+    up_to({".litematic", "the same blocks for Litematica", true, false, true, true, false, false, false, true}, 0,
+          INT32_MAX),
     {".binvox", "binvox occupancy, padded to a cube", true, false, false, true},
     of_arrays(".vti", "VTK image data for ParaView, all channels as cell data"),
     {".pvti", "the same in pieces of some layers each, OUT.1.vti, ...; see --pieces", false, true, false, false, false,
      false, true},
     of_arrays(".nrrd", "NRRD for 3D Slicer and teem; OUT.CHANNEL.nrrd for several; see --space", &format::has_space),
-    of_arrays(".nii", "NIfTI-1 for nibabel, FSL and 3D Slicer; OUT.CHANNEL.nii for several; see --space",
-              &format::has_space),
-    of_arrays(".nii.gz", "the same, compressed", &format::has_space),
+    up_to(of_arrays(".nii", "NIfTI-1 for nibabel, FSL and 3D Slicer; OUT.CHANNEL.nii for several; see --space",
+                    &format::has_space),
+          INT16_MAX),
+    up_to(of_arrays(".nii.gz", "the same, compressed", &format::has_space), INT16_MAX),
     of_arrays(".zarr", "Zarr 3 group with a compressed array for each channel, in shards of 256^3; see --levels",
               &format::has_levels, &format::has_halves),
     {".glb", "glTF mesh of the voxels' outer sides, with colours; see --merge", true, false, true, false},
@@ -178,6 +188,23 @@ const format* find_format(const std::filesystem::path& path) {
     for (const format& f : all_formats)
         if (f.extension == extension) return &f;
     return nullptr;
+}
+
+void check_extent(const std::filesystem::path& path, const std::array<std::int64_t, 3>& extent) {
+    const format* const f = find_format(path);
+    if (f == nullptr) return;
+    const auto [x, y, z] = extent;
+    const bool is_long = f->most_side > 0 && std::max({x, y, z}) > f->most_side;
+    // By doubles, which hold the product of any three sides.
+    const bool is_large =
+        f->most_voxels > 0 &&
+        static_cast<double>(x) * static_cast<double>(y) * static_cast<double>(z) > static_cast<double>(f->most_voxels);
+    if (!is_long && !is_large) return;
+    const std::string limit = is_long ? std::to_string(f->most_side) + " voxels along an axis"
+                                      : std::to_string(f->most_voxels) + " voxels in all";
+    throw write_error(path, "too large for " + std::string(f->extension) + ", which ends at " + limit +
+                                ": this grid has " + std::to_string(x) + " x " + std::to_string(y) + " x " +
+                                std::to_string(z) + "; use .npz, .zarr or .nrrd");
 }
 
 std::string_view why_no_stream(const format& f) {

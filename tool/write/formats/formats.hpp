@@ -77,6 +77,8 @@ struct format {
     bool has_space = false;       // obeys write_options::space
     bool has_faces = false;       // holds volume::faces
     bool has_halves = false;      // obeys write_options::half_distances
+    std::int64_t most_side = 0;   // voxels along an axis that it can number; 0: as many as there are
+    std::int64_t most_voxels = 0; // voxels of a grid; 0: as many as there are
 };
 
 // True if voxels of this size are cubes, but for what fitting a grid loses by rounding.
@@ -125,6 +127,8 @@ enum class held_as : std::uint8_t { grid, list, unknown };
 // another, or a file that is read. `shape` has extent and channels without values; an extent of 0 is not known yet.
 [[nodiscard]] written_names names_of(const volume& shape, const std::filesystem::path& path,
                                      const write_options& options, held_as held);
+// Throws write_error if the format of `path` cannot number the voxels of a grid of this extent, whatever is in it.
+void check_extent(const std::filesystem::path& path, const std::array<std::int64_t, 3>& extent);
 // Throws write_error if what is at `path` was not written by this tool and must not be replaced: a folder of .zarr.
 void check_replaceable(const std::filesystem::path& path);
 

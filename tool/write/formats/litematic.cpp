@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <limits>
 #include <string>
 #include <string_view>
 
@@ -109,9 +108,8 @@ std::vector<std::byte> packed_longs(std::span<const std::uint16_t> numbers, unsi
 
 std::vector<std::filesystem::path> write_litematic(const voxel_shape& v, const std::filesystem::path& path,
                                                    const write_options& options) {
+    check_extent(path, v.extent);
     const block_grid grid(v, options);
-    if (grid.volume() > std::numeric_limits<std::int32_t>::max())
-        throw write_error(path, "too large for .litematic, which ends at 2^31 - 1 blocks; use .npz, .vti or .nrrd");
     const unsigned bits = bits_of_block(grid.list());
     return write_block_file(
         grid, litematic_head(grid, static_cast<std::int64_t>(v.num_voxels())), litematic_tail(),

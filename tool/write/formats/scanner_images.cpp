@@ -179,10 +179,7 @@ std::vector<std::filesystem::path> write_nii(const volume& v, const std::filesys
                                              const write_options& options) {
     double moved = 0;
     v.for_each_channel([&](const volume& of, const channel&) {
-        const std::int64_t longest = *std::max_element(of.extent.begin(), of.extent.end());
-        if (longest > INT16_MAX)
-            throw write_error(path, "too large for .nii, which ends at 32767 voxels along an axis: this grid has " +
-                                        std::to_string(longest) + "; use .nrrd or .zarr");
+        check_extent(path, of.extent);
         for (std::size_t a = 0; a < 3; ++a) moved = std::max(moved, moved_by_floats(of, a));
     });
     if (constexpr double most = 0x1p-10; moved > most && options.warn)

@@ -78,16 +78,11 @@ std::int64_t num_bytes(const block_grid& grid, int threads) {
 
 std::vector<std::filesystem::path> write_schem(const voxel_shape& v, const std::filesystem::path& path,
                                                const write_options& options) {
-    constexpr std::int64_t most_side = std::numeric_limits<std::int16_t>::max();
-    constexpr std::int64_t most_blocks = std::numeric_limits<std::int32_t>::max();
+    check_extent(path, v.extent);
     const block_grid grid(v, options);
-    const auto refuse = [&] {
-        throw write_error(path, "too large for .schem, which ends at 32767 blocks a side and 2^31 in all; use .npz, "
-                                ".vti or .nrrd");
-    };
-    if (*std::max_element(v.extent.begin(), v.extent.end()) > most_side || grid.volume() > most_blocks) refuse();
     const std::int64_t bytes = num_bytes(grid, options.threads);
-    if (bytes > most_blocks) refuse();
+    if (bytes > std::numeric_limits<std::int32_t>::max())
+        throw write_error(path, "too large for .schem, whose blocks have 2^31 bytes at most; use .npz, .zarr or .nrrd");
     return write_block_file(grid, schem_head(grid, bytes), schem_tail(), schem_bytes, path, options);
 }
 
