@@ -8,7 +8,7 @@
 #   make docs                                     the site, in build/docs/html
 #   make dist                                     the source archive, in build/dist
 #   make wheels                                   wheels of the Python package that need no compiler, in build/wheels/dist
-#   make windows                                  the tool for Windows, build/windows/tool/voxelize.exe
+#   make windows                                  the tool and the C API for Windows: build/windows/tool/voxelize.exe, capi/voxelpipe.dll
 #   make page                                     a page that converts models in the browser, build/page/voxelize.html
 #   make blender                                  the Blender add-on with those wheels, in build/blender
 #   make release                                  all that a release holds, in build/release

@@ -7,6 +7,7 @@
 #   *.whl, wheels-ARCH.txt                         wheels and what their tests said (scripts/wheels.sh)
 #   voxelize-VERSION-linux-ARCH.tar.gz             the tool, as those wheels bring it, with its licences
 #   voxelize-VERSION-windows-x86_64.zip            the tool for Windows, with its licences (scripts/windows.sh --check)
+#   voxelpipe-VERSION-c-windows-x86_64.zip         the C API for Windows: header, DLL, its functions, MinGW's import library
 #   voxelize-VERSION.html                          the page that converts models in the browser (scripts/page.sh --check)
 #   voxelpipe-blender-VERSION.zip                  the Blender add-on with these wheels (scripts/blender.sh)
 #   voxelpipe-VERSION-site.tar.gz                  the site (scripts/docs.sh --check)
@@ -88,7 +89,7 @@ make_tool() {
 make_windows() {
     local packed=voxelize-$version-windows-x86_64 licenses file
     scripts/windows.sh --check --release
-    rm -rf "$folder/work" "$folder/$packed.zip"
+    rm -rf "$folder/work"
     licenses=$folder/work/$packed/licenses
     mkdir -p "$licenses"
     cp build/windows/tool/voxelize.exe docs/tool.md LICENSE "$folder/work/$packed/"
@@ -100,8 +101,23 @@ make_windows() {
         cp -L "/usr/share/doc/$file/copyright" "$licenses/$file.txt"
     done
     x86_64-w64-mingw32-strip -p "$folder/work/$packed/voxelize.exe"
-    find "$folder/work/$packed" -exec touch -h -d "@$(git show -s --format=%ct HEAD)" {} +
-    (cd "$folder/work" && find "$packed" -type f | LC_ALL=C sort | TZ=UTC zip -q -X "$folder/$packed.zip" -@)
+    zip_folder "$packed"
+
+    packed=$name-c-windows-x86_64
+    licenses=$folder/work/$packed/licenses
+    mkdir -p "$licenses"
+    cp capi/include/voxelpipe.h build/windows/capi/{voxelpipe.dll,voxelpipe.def,libvoxelpipe.dll.a} docs/c_api.md LICENSE "$folder/work/$packed/"
+    for file in libglm-dev mingw-w64-x86-64-dev gcc-mingw-w64-x86-64-posix-runtime; do
+        cp -L "/usr/share/doc/$file/copyright" "$licenses/$file.txt"
+    done
+    x86_64-w64-mingw32-strip -p "$folder/work/$packed/voxelpipe.dll"
+    zip_folder "$packed"
+}
+# zip_folder NAME: build/release/NAME.zip of build/release/work/NAME, which goes; the same files give the same archive.
+zip_folder() {
+    rm -f "$folder/$1.zip"
+    find "$folder/work/$1" -exec touch -h -d "@$(git show -s --format=%ct HEAD)" {} +
+    (cd "$folder/work" && find "$1" -type f | LC_ALL=C sort | TZ=UTC zip -q -X "$folder/$1.zip" -@)
     rm -rf "$folder/work"
 }
 make_page() {

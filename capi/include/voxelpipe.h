@@ -31,8 +31,11 @@
 
 #include <stdint.h>
 
-#if defined(_WIN32)
-#define VP_API
+/* VP_BUILDS_LIBRARY is the library's own. */
+#if defined(_WIN32) && defined(VP_BUILDS_LIBRARY)
+#define VP_API __declspec(dllexport)
+#elif defined(_WIN32)
+#define VP_API __declspec(dllimport)
 #else
 #define VP_API __attribute__((visibility("default")))
 #endif
