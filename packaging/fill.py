@@ -14,7 +14,7 @@ import shutil
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-RECIPES = ["vcpkg", "conan", "spack", "conda"]
+RECIPES = ["vcpkg", "conan", "spack", "conda", "homebrew"]
 
 
 def main():

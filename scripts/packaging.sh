@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # Tests the source archive and the recipes of packaging/ as far as they can be without their servers: Conan's by conan create, vcpkg's and
-# Spack's with their commands replaced, conda's parsed and rendered. All of them take the archive that scripts/dist.sh has just made.
+# Spack's with their commands replaced, conda's parsed and rendered, Homebrew's options and test program. All of them take the archive that scripts/dist.sh has just made.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
 need_packages python3 python3-venv
@@ -19,7 +19,7 @@ if ! cmp -s packaging/requirements-test.txt "$folder/venv/requirements.txt"; the
 fi
 
 say "files that a forge reads"
-"$folder/venv/bin/check-jsonschema" --builtin-schema vendor.github-workflows .github/workflows/ci.yml
+"$folder/venv/bin/check-jsonschema" --builtin-schema vendor.github-workflows .github/workflows/*.yml
 "$folder/venv/bin/cffconvert" --validate -i CITATION.cff
 
 say "filling in the recipes"
@@ -50,6 +50,7 @@ conan remote disable '*' >/dev/null 2>&1
 conan create "$folder/recipes/conan" --version "$(scripts/version.py)" >"$folder/conan.log" 2>&1 || { cat "$folder/conan.log"; die "conan create failed"; }
 grep -E 'test_package|Package .* created' "$folder/conan.log" | tail -n 2
 
-say "Spack and conda"
+say "Spack, conda and Homebrew"
 python3 packaging/tests/spack.py "$folder/recipes/spack/package.py" CMakeLists.txt
 "$folder/venv/bin/python" packaging/tests/conda.py "$folder/recipes/conda/recipe.yaml"
+packaging/tests/homebrew.py "$folder/recipes/homebrew/voxelpipe.rb" CMakeLists.txt capi/include/voxelpipe.h
