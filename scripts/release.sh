@@ -113,7 +113,7 @@ make_windows() {
     x86_64-w64-mingw32-strip -p "$folder/work/$packed/voxelpipe.dll"
     zip_folder "$packed"
 }
-# zip_folder NAME: build/release/NAME.zip of build/release/work/NAME, which goes; the same files give the same archive.
+# zip_folder NAME: packs the folder that a part has filled under this name, and removes it; the same files give the same archive.
 zip_folder() {
     rm -f "$folder/$1.zip"
     find "$folder/work/$1" -exec touch -h -d "@$(git show -s --format=%ct HEAD)" {} +
